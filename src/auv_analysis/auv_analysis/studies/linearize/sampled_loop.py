@@ -80,6 +80,7 @@ class HeldPlant:
     A, B : (n, n), (n, 6) of x_dot = A x + B u; its first eight states are what a law sees
     period : h, s, for which u is held
     Phi : (n, n) exp(A h)
+    Gamma : (n, 6) by how much a u acts that is held over a period
 
     """
 
@@ -87,10 +88,12 @@ class HeldPlant:
     B: np.ndarray
     period: float
     Phi: np.ndarray = field(init=False)
+    Gamma: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
         """Transition over one period."""
-        object.__setattr__(self, 'Phi', self._over(self.period)[0])
+        for name, matrix in zip(('Phi', 'Gamma'), self._over(self.period), strict=True):
+            object.__setattr__(self, name, matrix)
 
     def _over(self, seconds: float) -> tuple[np.ndarray, np.ndarray]:
         """exp(A t) and the integral of exp(A s) B over s from 0 to t."""
@@ -106,8 +109,8 @@ class HeldPlant:
         whole = int(np.floor(delay / self.period + WHOLE))
         rest = max(delay - whole * self.period, 0.0)
         rest = 0.0 if rest < WHOLE * self.period else rest
-        after, newest = self._over(self.period - rest)
-        return HeldInput(delay, whole, newest, after @ self._over(rest)[1])
+        newest = self._over(self.period - rest)[1]
+        return HeldInput(delay, whole, newest, self.Gamma - newest)
 
     def response(self, z: np.ndarray, held: HeldInput) -> np.ndarray:
         """(..., 8, 6) from u to what the law sees, at z = exp(i omega h) (...,)."""

@@ -103,6 +103,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """A model with its uncertainty from recordings, and a vehicle file."""
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices: threads only wait
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import say, waiting
     from auv_analysis.studies.identify.identify import Settings, identify
@@ -112,8 +113,6 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     from auv_dynamics.files.errors import FailedError
     from auv_dynamics.files.yaml_files import read_yaml
 
-    trial = read(options, 'identify')
-    vehicle = trial.vehicle
     applied = ['lag', 'delay'] if options.applied else []  # nothing is between it and the vehicle
     settings = Settings(
         free=(*DEFAULT, *(options.free or ())), fixed=[*options.fixed, *applied],
@@ -121,6 +120,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         origin=options.prior or 'options', observer=options.observer, bootstrap=options.bootstrap,
         profile=[name.strip() for name in options.profile.split(',')] if options.profile else (),
     )  # fmt: skip
+    trial = read(options, 'identify')
+    vehicle = trial.vehicle
     with results_folder(trial.out, overwrite=options.overwrite, inputs=trial.inputs) as folder:
         found = identify(trial.training, trial.held, vehicle, settings, lambda t: say(f'  {t}'))
         results = results_of(found, trial.notes, accepted=options.accept)
@@ -144,7 +145,6 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
 def read(options: argparse.Namespace, command: str) -> Trial:
     """Vehicle and recordings that a command is given."""
-    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices: threads only wait
     from auv_analysis.output.progress import waiting
     from auv_analysis.scenario.scaling import UNFIT
     from auv_dynamics.files.shipped import shipped

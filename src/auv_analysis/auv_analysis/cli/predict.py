@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from typing import Any
 
 from auv_analysis.cli.arguments import add_results, number
@@ -21,6 +22,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """How well a vehicle file predicts a recording, beside persistence and a black box."""
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices: threads only wait
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import TextConsole, waiting
     from auv_analysis.report.plots import save_figures

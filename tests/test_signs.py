@@ -65,7 +65,7 @@ FORMULAS = [
     Formula(
         'J', 'auv_dynamics.vehicle.kinematics',
         ['quaternion', 'rotation', 'euler', 'jacobian', 'position_rate', 'attitude_rate'],
-        check_J, 52,
+        check_J, 50,
     ),
     Formula(
         'U', 'auv_gvc_controller.laws.model', ['decompose', 'inverse_upper'], check_U, 7

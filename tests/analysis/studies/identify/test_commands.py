@@ -1,7 +1,10 @@
 """`auv identify` and `auv predict` on bags: our own and others', with their refusals."""
 
 import json
+import os
 import re
+import sys
+from argparse import Namespace
 
 import numpy as np
 import pytest
@@ -11,6 +14,8 @@ from helpers.foreign_bags import Maker, motion, simple, write
 from helpers.report_pages import check_numbers
 from pyarrow import parquet
 
+from auv_analysis.cli import identify as identify_command
+from auv_analysis.cli import predict as predict_command
 from auv_analysis.cli.main import main
 from auv_analysis.report.results import Results
 from auv_analysis.studies.identify import identify, prediction
@@ -294,3 +299,13 @@ def test_without_wrench_or_attitude_nothing_is_identified(
     assert code == 2
     assert line in said
     assert len(said.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize('command', [identify_command, predict_command])
+def test_linear_algebra_has_one_thread_before_numpy_is_loaded(command, monkeypatch):
+    """NumPy reads it when it is imported, as it is by the first import that is refused here."""
+    monkeypatch.delenv('OPENBLAS_NUM_THREADS', raising=False)
+    monkeypatch.setitem(sys.modules, 'auv_analysis.output.folder', None)
+    with pytest.raises(ImportError):
+        command.run(Namespace())
+    assert os.environ['OPENBLAS_NUM_THREADS'] == '1'

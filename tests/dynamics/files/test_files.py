@@ -4,6 +4,7 @@ The reader is called directly here; `test_bad_files` goes through the command.
 """
 
 import copy
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,9 +18,10 @@ from hypothesis import strategies as st
 
 from auv_analysis import load_scenario
 from auv_dynamics import load_vehicle
+from auv_dynamics.files import yaml_files
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.shipped import shipped
-from auv_dynamics.files.yaml_files import parse_any_yaml, read_yaml, yaml_text
+from auv_dynamics.files.yaml_files import check, parse_any_yaml, read_yaml, yaml_text
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 
 BOMB = 'a: &a [x, x, x, x, x, x, x, x, x]\n' + ''.join(
@@ -224,3 +226,20 @@ def test_absurd_centre_of_gravity_is_refused(largest: float) -> None:
     with pytest.raises(InputError) as caught:
         vehicle_from_dict(contents, 'odd.yaml')
     one_line(caught.value, 'odd.yaml')
+
+
+def test_what_is_sound_is_so_by_one_schema(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was checked is remembered: by which schema, and nothing that was refused."""
+    monkeypatch.setattr(yaml_files, 'MOST_SOUND', 2)
+    paths = {}
+    for kind in ('number', 'string'):
+        entry = {'title': f'a {kind}', 'type': kind}
+        paths[kind] = tmp_path / f'{kind}.json'
+        paths[kind].write_text(json.dumps({'title': 'a file', 'properties': {'x': entry}}))
+    for x in (1, '1', 2.0, '2', 3, 1, '1'):
+        kind = 'string' if isinstance(x, str) else 'number'
+        other = {'string': 'number', 'number': 'string'}[kind]
+        for _ in range(2):
+            check({'x': x}, paths[kind], 'f')
+            with pytest.raises(InputError, match=f'f: x: expected a {other}, found'):
+                check({'x': x}, paths[other], 'f')

@@ -64,8 +64,8 @@ FORMULAS = [
     Formula('M', 'auv_dynamics.vehicle.vehicle', ['skew', 'rigid_body_matrix'], check_M, 5),
     Formula(
         'J', 'auv_dynamics.vehicle.kinematics',
-        ['quaternion', 'rotation', 'euler', 'jacobian', 'position_rate', 'attitude_rate'],
-        check_J, 50,
+        ['_first', 'quaternion', 'rotation', 'euler', 'jacobian', 'position_rate', 'attitude_rate'],
+        check_J, 52,
     ),
     Formula(
         'U', 'auv_gvc_controller.laws.model', ['decompose', 'inverse_upper'], check_U, 7

@@ -359,8 +359,7 @@ def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expect
 def test_integrals_stop_at_the_limits_that_are_known(told) -> None:
     """The adaptive term of surge stays zero while its wrench is cut, that of an idle axis too."""
     arguments = [*LOCKSTEP, *parameters(**told)]
-    with program() as peer:
-        peer.add(ControllerNode, arguments)
+    with graph(('controller_node', arguments)) as (peer, _):
         peer.listen(topics.WRENCH, topics.DISTURBANCE_ESTIMATE)
         peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')
         for k in range(5):

@@ -107,7 +107,7 @@ def test_publishes_nothing_before_its_subscribers_have_matched(peer) -> None:
     for data, said in ((True, 'plant_node'), (False, 'paused')):
         answer = peer.call(SetBool, 'plant_node/run', SetBool.Request(data=data))
         assert (answer.success, answer.message) == (not data, said)
-    peer.spin(0.2)
+    peer.spin(plant_node.MET + 0.2)
     listening(peer)
     peer.until(lambda: peer.call(Trigger, 'plant_node/ready').success, 'all to be there')
     peer.spin(0.2)
@@ -120,7 +120,7 @@ def test_starts_by_itself_once_all_are_there(peer) -> None:
     plant = peer.add(PlantNode, {**BARRIER, 'start_after': ['first']})
     assert plant.wrench_timeout == 30.0
     listening(peer)
-    peer.spin(0.2)
+    peer.spin(plant_node.MET + 0.2)
     assert not peer.heard['odom']
 
     asked = []

@@ -1,6 +1,7 @@
 """A replay beside a vehicle: it gets no recorded command unless somebody says so, and no clock."""
 
 import math
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -8,12 +9,14 @@ import pytest
 from geometry_msgs.msg import Twist, Wrench
 from helpers.made_messages import Bag, geometry, serialized, stamped
 from helpers.node_processes import assert_one_line, graph, parameters, run_node, stop
+from helpers.nodes_in_process import program
 from helpers.played_bags import STEP, ended, made, playing, process, steps_of, there
 from rclpy.qos import DurabilityPolicy
 from std_srvs.srv import Trigger
 
 from auv_analysis.bag.reading import read_bag
 from auv_analysis.nodes import replay_node, replay_publishers
+from auv_analysis.nodes.replay_node import ReplayNode
 from auv_analysis.nodes.replay_publishers import CommandGuard
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.endpoints import NAMELESS, UNNAMED
@@ -23,6 +26,8 @@ from auv_dynamics.ros.topics import Topic
 ODOM = there(topics.ODOM)
 AS_RECORDED = {'original_names': True, 'commands': True}
 NEVER = '-p', 'expected_subscribers:=["odom=2"]'  # it meets others until it finds what it refuses
+WAITS = {name: getattr(replay_node, name) for name in ('DISCOVERY', 'ANNOUNCED')}  # s
+COMMAND_ALONE = {**AS_RECORDED, 'topics': ['/wrench']}
 FORCED = {**AS_RECORDED, 'allow_commands_to_foreign': True, 'rate': 0.0}
 
 
@@ -34,6 +39,23 @@ def test_a_foreign_listener_gets_no_command(tmp_path: Path) -> None:
     assert len(output.strip().splitlines()) == 1, output
     assert '/wrench: expected nobody who acts on recorded commands, found /test_peer' in output
     assert not any(peer.heard.values()), 'nothing is published'
+
+
+@pytest.mark.parametrize(('asked', 'wait'), [
+    ({}, 'DISCOVERY'), ({'original_names': True}, 'ANNOUNCED'), (COMMAND_ALONE, 'ANNOUNCED'),
+    ({**COMMAND_ALONE, 'allow_commands_to_foreign': True}, 'DISCOVERY'),
+], ids=str)  # fmt: skip
+def test_others_are_looked_for_until_a_lost_announcement_comes_again(
+    asked: dict, wait: str, tmp_path: Path
+) -> None:
+    """Where the vehicle may be among them: Fast DDS repeats one after 3 s."""
+    with program() as peer, pytest.MonkeyPatch.context() as patch:
+        for name, seconds in WAITS.items():
+            patch.setattr(replay_node, name, seconds)  # as for a user
+        begins = time.monotonic()
+        node = peer.add(ReplayNode, {'bag': str(made(tmp_path / 'bag')), **asked})
+        assert begins <= node._until - WAITS[wait] <= time.monotonic()
+    assert WAITS['ANNOUNCED'] > 3.0 > WAITS['DISCOVERY'] > 0.0
 
 
 def test_commands_stop_when_a_foreign_listener_comes(tmp_path: Path) -> None:

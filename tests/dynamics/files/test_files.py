@@ -236,6 +236,9 @@ def test_what_is_sound_is_so_by_one_schema(tmp_path: Path, monkeypatch: pytest.M
         entry = {'title': f'a {kind}', 'type': kind}
         paths[kind] = tmp_path / f'{kind}.json'
         paths[kind].write_text(json.dumps({'title': 'a file', 'properties': {'x': entry}}))
+    check({'x': 1}, paths['number'], 'f')
+    with pytest.raises(InputError, match='f: x: expected a number, found True'):
+        check({'x': True}, paths['number'], 'f')
     for x in (1, '1', 2.0, '2', 3, 1, '1'):
         kind = 'string' if isinstance(x, str) else 'number'
         other = {'string': 'number', 'number': 'string'}[kind]

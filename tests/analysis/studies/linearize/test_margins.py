@@ -368,8 +368,9 @@ def test_the_command_prints_margins_and_writes_them(tmp_path, monkeypatch, capsy
     out, asked = tmp_path / 'out', []
 
     def kept(setting):
-        asked.append((setting, stability_margins(setting)))
-        return asked[-1][1]
+        found = stability_margins(setting)
+        asked.append((setting, copy.deepcopy(found)))
+        return found
 
     monkeypatch.setattr(margins, 'stability_margins', kept)
     check = tmp_path / 'check.json'
@@ -387,7 +388,9 @@ def test_the_command_prints_margins_and_writes_them(tmp_path, monkeypatch, capsy
         assert word in text
     document = json.loads((out / 'linearization.json').read_text())
     ((setting, expected),) = asked
-    assert setting.scenario.data == load_scenario('case1_bluerov2_heavy').data
+    given = load_scenario('case1_bluerov2_heavy')
+    assert setting.scenario.data == given.data
+    assert setting.scenario.vehicle_data == given.vehicle_data
     assert (setting.controller, setting.delay, setting.lag) == ('gvc', 0.03, 0.02)
     assert (setting.nu0, setting.eta0) == (None, None)
     assert document['models']['gvc']['margins'] == expected

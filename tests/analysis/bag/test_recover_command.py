@@ -532,3 +532,13 @@ def test_memory_does_not_grow_with_the_bag(tmp_path: Path) -> None:
     tracemalloc.stop()
     assert size > 35e6
     assert peak < 12e6
+
+
+def test_a_bag_whose_name_is_no_text_is_repaired(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / os.fsdecode(b'd\xffve'))
+    (file,) = bag.glob('*.mcap')
+    whole = len(messages_of(file))
+    cut(file, 0.3)
+    assert recover(bag)
+    assert 0 < len(messages_of(next(bag.glob('*.mcap')))) < whole
+    assert yaml.safe_load((bag / 'metadata.yaml').read_text())

@@ -223,7 +223,7 @@ def _nodes_in(scenario: Scenario, path: str) -> list[dict[str, Any]]:
 
 
 def _nodes_at(root: dict[str, Any], data: Any, parts: Parts, file: object) -> list[dict[str, Any]]:
-    nodes = list(_applicable(root, root, data))
+    nodes = list(_applicable(root, data))
     for depth, part in enumerate(parts):
         if isinstance(part, int):
             check_container(data, parts, depth, file)
@@ -239,7 +239,7 @@ def _nodes_at(root: dict[str, Any], data: Any, parts: Parts, file: object) -> li
                 raise InputError(file, dotted(parts[: depth + 1]), expected, part)
             below = [_property(node, part) for node in nodes]
             data = data.get(part)
-        nodes = [node for inner in below for node in _applicable(inner, root, data)]
+        nodes = [node for inner in below for node in _applicable(inner, data)]
     return nodes
 
 
@@ -247,18 +247,18 @@ def _property(node: Mapping[str, Any], key: str) -> Any:
     return node.get('properties', {}).get(key, node.get('additionalProperties'))
 
 
-def _applicable(node: Any, root: dict[str, Any], data: Any) -> Iterator[dict[str, Any]]:
+def _applicable(node: Any, data: Any) -> Iterator[dict[str, Any]]:
     """Nodes of a schema that say something about `data`, conditions followed."""
     if not isinstance(node, dict):
         return
     yield node
     for inner in (*node.get('allOf', ()), *node.get('anyOf', ())):
-        yield from _applicable(inner, root, data)
+        yield from _applicable(inner, data)
     if 'if' in node:
         import jsonschema  # slow to load
 
         holds = jsonschema.Draft202012Validator(node['if']).is_valid(data)
-        yield from _applicable(node.get('then' if holds else 'else'), root, data)
+        yield from _applicable(node.get('then' if holds else 'else'), data)
 
 
 def said_of(data: Any, vehicle: Any, path: str) -> tuple[str, str]:

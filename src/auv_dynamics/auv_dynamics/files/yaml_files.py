@@ -230,8 +230,8 @@ def schema(path: Path) -> dict[str, Any]:
             return [whole(one) for one in node]
         if not isinstance(node, dict):
             return node
-        name = node.get('$ref', '').rpartition('/')[2]
-        node = {**root.get('$defs', {}).get(name, {}), **node}
+        if '$ref' in node:
+            node = {**root['$defs'][node['$ref'].removeprefix('#/$defs/')], **node}
         return {key: whole(inner) for key, inner in node.items() if key != '$ref'}
 
     return whole(root)

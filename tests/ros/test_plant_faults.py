@@ -26,8 +26,8 @@ def faults(**entries: dict[str, Any]) -> list[str]:
     return given
 
 
-def step_of(message: Any) -> int:
-    return interface.nanoseconds(message.header.stamp) // STEP
+def step_of(message: Any, step: int = STEP) -> int:
+    return interface.nanoseconds(message.header.stamp) // step
 
 
 def velocity(message: Any) -> float:
@@ -99,7 +99,7 @@ def in_real_time(heard_again: int, last: int) -> tuple[list[int], list[int], np.
     The twist has the stamps of the odometry. Where a machine is given patience steps are longer:
     to hear 400 messages a second is work.
     """
-    h = patience(0.01)  # s
+    h, ns = patience(0.01), round(patience(STEP))  # s, ns
     given = faults(
         gone={'kind': 'sensor_drop_out', '_from': 30 * h, 'to': 50 * h},
         late={'kind': 'sensor_delay', 'delay': 20 * h, '_from': 60 * h, 'to': 100 * h},
@@ -111,24 +111,20 @@ def in_real_time(heard_again: int, last: int) -> tuple[list[int], list[int], np.
         peer.listen(*HEARD, topics.TWIST)
         say = peer.node.create_publisher(topics.WRENCH.type, topics.WRENCH.name, 10)
 
-        def number(message: Any) -> int:
-            return round(interface.nanoseconds(message.header.stamp) / 1e9 / h)
-
         def answer(message: Any) -> None:
-            k = number(message)
-            ns = interface.nanoseconds(message.header.stamp)
-            say.publish(convert.wrench(ns, (k + 1.0, 0, 0, 0, 0, 0), Frames()))
+            k = step_of(message, ns)
+            say.publish(convert.wrench(k * ns, (k + 1.0, 0, 0, 0, 0, 0), Frames()))
 
         qos = topics.every_step()
         peer.node.create_subscription(topics.ODOM.type, topics.ODOM.name, answer, qos)
         truth = peer.heard[topics.GROUND_TRUTH.name]
-        peer.until(lambda: truth and number(truth[-1]) == last, 'the end')
+        peer.until(lambda: truth and step_of(truth[-1], ns) == last, 'the end')
         peer.until(lambda: len(peer.heard[topics.WRENCH_APPLIED.name]) > last, 'every wrench')
         applied = np.array([m.wrench.force.x for m in peer.heard[topics.WRENCH_APPLIED.name]])
-        steps = [number(m) for m in peer.heard['odom']]
+        steps = [step_of(m, ns) for m in peer.heard['odom']]
         peer.until(lambda: len(peer.heard['twist']) == len(steps), 'every twist')
-        assert [number(m) for m in peer.heard['twist']] == steps
-        return [number(m) for m in truth], steps, applied
+        assert [step_of(m, ns) for m in peer.heard['twist']] == steps
+        return [step_of(m, ns) for m in truth], steps, applied
 
 
 @pytest.mark.parametrize(

@@ -85,7 +85,8 @@ def parser(line: Sequence[str] | None = None) -> Parser:
     )
     main.groups = GROUPS
     commands = main.add_subparsers(dest='command', metavar='COMMAND')
-    for name in COMMANDS.keys() & (line or [])[:1] or COMMANDS:
+    first = line[0] if line else ''
+    for name in [first] if first in COMMANDS else COMMANDS:
         command = commands.add_parser(name, help=COMMANDS[name], description=COMMANDS[name])
         main.children[name] = command
         command.add_argument('--json', action='store_true', help='one JSON document on stdout')

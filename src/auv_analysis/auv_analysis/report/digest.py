@@ -307,7 +307,7 @@ class _Builder:
         if not self._split:
             self._all('whole', name, t, values)
             return
-        early = t <= self._run.start + TRANSIENT
+        early = t <= self._ends['early'][1]
         self._all('early', name, t[early], values[early])
         self._all('late', name, t[~early], values[~early])
 

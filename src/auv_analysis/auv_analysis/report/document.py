@@ -212,7 +212,7 @@ def maths(text: str) -> markupsafe.Markup:
 
 
 PACKAGES = ('auv_analysis', 'auv_gvc_controller', 'auv_dynamics', 'numpy', 'numba', 'scipy')
-_version, _sources = cache(metadata.version), cache(sources_digest)  # as they were loaded
+_version = cache(metadata.version)
 
 
 def provenance() -> dict[str, Any]:
@@ -227,6 +227,6 @@ def provenance() -> dict[str, Any]:
     return {
         'command': shlex.join(['auv', *sys.argv[1:]]) if ours else '',
         'versions': versions,
-        'sources': _sources(),
+        'sources': sources_digest(),
         'written': f'{datetime.now(UTC):%Y-%m-%d %H:%M} UTC',
     }

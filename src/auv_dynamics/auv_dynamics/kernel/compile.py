@@ -62,6 +62,7 @@ def _digest(sources: Mapping[str, bytes]) -> str:
     return digest.hexdigest()[:16]
 
 
+@functools.cache
 def sources_digest() -> str:
     """Digest of every Python source of the workspace's packages."""
     return _digest(_sources())

@@ -54,6 +54,11 @@ def velocity_gain(gains: Any, model: ControlModel) -> np.ndarray:
     return gain if np.isfinite(gain).all() else np.zeros((6, 6))
 
 
+def velocity_rates(K_D: np.ndarray, M: np.ndarray) -> np.ndarray:
+    """Eigenvalues (..., 6) of M^-1 K_D (..., 6, 6), 1/s: rates of the loop of `sampled_rate`."""
+    return np.linalg.eigvals(np.linalg.solve(M, K_D))
+
+
 def sampled_rate(K_D: np.ndarray, M: np.ndarray) -> tuple[float, str]:
     """Fastest rate of the velocity loop M nu_dot + K_D nu = 0, and the DOF that has most of it.
 
@@ -88,7 +93,7 @@ def sampling_warning(K_D: np.ndarray, M: np.ndarray, step: float) -> str | None:
     step : s
 
     """
-    eigenvalues = np.linalg.eigvals(np.linalg.solve(M, K_D))
+    eigenvalues = velocity_rates(K_D, M)
     damped = eigenvalues[eigenvalues.real >= 0]  # the others grow at every step, however short
     if len(damped) == 0:
         return None

@@ -14,7 +14,7 @@ import numpy as np
 from auv_analysis.scenario.scenario import Scenario
 from auv_dynamics.files.yaml_files import matrix6
 from auv_dynamics.vehicle import DOFS
-from auv_gvc_controller.control.gains import body_gains
+from auv_gvc_controller.control.gains import body_gains, velocity_rates
 from auv_gvc_controller.laws.law import SHIPPED, make_gains
 from auv_gvc_controller.laws.model import ControlModel
 
@@ -71,8 +71,7 @@ class GainSpace:
         M = np.reshape(self.model.dynamics.M, (6, 6))
         rows = ({gain: values[i] for gain, values in gains.items()} for i in range(len(x)))
         K_D = [body_gains(make_gains(self.law, row), self.model)[0] for row in rows]
-        rates = np.linalg.eigvals(np.linalg.solve(M, np.stack(K_D)))  # of all as `sampled_rate`
-        return np.log(self.fastest / np.abs(rates).max(axis=1))
+        return np.log(self.fastest / np.abs(velocity_rates(np.stack(K_D), M)).max(axis=1))
 
     def at_bound(self, x: np.ndarray) -> dict[str, str]:
         """Coordinates of a point (n,) that lie on a bound of the search: 'lower' or 'upper'."""

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.made_runs import N, made
+from pyarrow import parquet
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.herman2018 import paper
-from auv_analysis.herman2018.claims import ROWS, Row, claims_part, judge_runs
+from auv_analysis.herman2018.claims import ROWS, Row, claims_part, judge_runs, write_claims
 from auv_analysis.herman2018.evidence import ErrorSensitivity, Evidence, Signals, grade
 from auv_analysis.output.text import MISSING
 from auv_analysis.report.digest import digests
@@ -101,6 +102,15 @@ def test_verdicts_of_case_2(table2, approved):
     others = [claim for number, claim in table2.items() if number not in decided]
     assert {claim.verdict for claim in others} == {'other case'}
     assert {claim.ours for claim in others} == {MISSING}
+
+
+def test_a_claim_without_numbers_has_a_row_that_says_so(table2, tmp_path):
+    rows = parquet.read_table(write_claims(tmp_path, list(table2.values()))).to_pylist()
+    assert {row['number'] for row in rows} == set(table2)
+    empty = {'of': '', 'name': '', 'value': None, 'unit': ''}
+    without = [row for row in rows if not row['of']]
+    assert without
+    assert all(row | empty == row for row in without)
 
 
 @pytest.mark.parametrize(

@@ -538,6 +538,7 @@ def test_what_was_not_recorded_is_said_in_its_panel(runs, foreign, tmp_path) -> 
     alone, _ = _drawn({'told': replace(told, unexplained=wrench, faults=())}, tmp_path)
     del lost['three']
     lost['one'].tau[:, 3] = 0.0
+    lost['two'].nu[:, 2] = np.nan  # heave is seen in the other run
     figures, captions = _drawn(lost, tmp_path)
     scales = [axes.get_yscale() for axes in figures['inputs_compared'].axes]
     assert scales[3] == 'linear', 'what does nothing is not far from what does'

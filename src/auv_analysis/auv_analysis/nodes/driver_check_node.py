@@ -61,7 +61,6 @@ class CheckNode(BulkNode):
             COMMANDER if commands else interface.OBSERVER,
             context=context,
             namespace=namespace,
-            use_global_arguments=False,
             start_parameter_services=False,
             enable_rosout=False,
         )

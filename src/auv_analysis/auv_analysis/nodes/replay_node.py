@@ -61,7 +61,7 @@ class Playback:
 
     def restart(self) -> None:
         """Forget the place in the bag: the next message is the first one."""
-        self._place, self._reached, self._until = None, 0, -1
+        self._place, self._until = None, -1
 
     def wait(self, now: float, ns: int) -> float:
         """Seconds until a message of this log time is due; 0 or less: it is; HELD: paused."""
@@ -269,7 +269,6 @@ class Player:
             return False
         allowed = self.guard.may(topic, now)
         if allowed is None or not self._receivers.have_room(topic):
-            self._receivers.ask()
             return False
         if message.ns != self._clock_ns and self._publish_clock is not None:
             self._publish_clock(message.ns, ())
@@ -456,9 +455,7 @@ class Replay(Participant):
         given = [Parameter(name, value=v) for name, v in parameters.items() if v is not None]
 
         def make(context: Context) -> ReplayNode:
-            return ReplayNode(
-                context=context, parameter_overrides=given, use_global_arguments=False
-            )
+            return ReplayNode(context=context, parameter_overrides=given)
 
         super().__init__(domain, make, NAME)
 

@@ -307,7 +307,7 @@ class Receivers:
         """Whether everything that was published is known to have been taken."""
         return self._sent == self._taken
 
-    def ask(self, *, always: bool = False) -> None:
+    def ask(self, *, always: bool) -> None:
         """Go on asking; begin when half of a window is used, or `always` when it is used at all."""
         if self._round is None:
             enough = 1 if always else WINDOW // 2

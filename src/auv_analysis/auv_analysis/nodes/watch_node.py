@@ -47,7 +47,6 @@ class WatchNode(BulkNode):
             interface.OBSERVER,
             context=context,
             namespace=namespace,
-            use_global_arguments=False,
             start_parameter_services=False,
             enable_rosout=False,
         )

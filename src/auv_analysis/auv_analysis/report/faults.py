@@ -56,11 +56,13 @@ def fault_part(out: Path, runs: Mapping[str, AnyRun]) -> tuple[Section, list[Sen
     if len({run.faults for run in runs.values()}) != 1 or not next(iter(runs.values())).faults:
         return None
     found: dict[str, list[FaultResponse]] = {name: responses(run) for name, run in runs.items()}
-    if not all(found.values()):
-        return Section('faults', TITLE, [NO_ERROR]), []
-    write_responses(out, found)
-    figure = fault_figure(digests(runs), out / 'figures')
-    blocks: list[Block] = [ABOUT, figure, *fault_tables(found)]
+    blocks: list[Block] = [NO_ERROR]
+    if all(found.values()):
+        write_responses(out, found)
+        figure = fault_figure(digests(runs), out / 'figures')
+        blocks = [ABOUT, figure, *fault_tables(found)]
+    else:
+        found = {}
     return Section('faults', TITLE, blocks), [*fault_overview(found)]
 
 

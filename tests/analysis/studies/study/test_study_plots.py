@@ -53,7 +53,9 @@ def test_sensitivities_stand_beside_their_measures(method: str, tmp_path) -> Non
         for gain, head in (('k_D', '$k_{D}$'), ('Gamma', r'$\Gamma$'))
     }
     assert cells(right, left) == pytest.approx(expected)
-    assert ('total index' in right.get_title(loc='left')) == (method == 'sobol')
+    index = {'sobol': 'total index', 'morris': 'effect μ*'}[method]
+    assert right.get_title(loc='left') == f'(b) {index}'
+    assert f'(b) {index} after' in record.caption
     assert 'between 1/2 and 2' in record.caption
     assert ('Sobol' in record.caption) == (method == 'sobol')
 

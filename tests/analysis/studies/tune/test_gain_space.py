@@ -7,8 +7,15 @@ from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
 
+from auv_analysis.cli import main
 from auv_analysis.studies.tune.cost import Measures
-from auv_analysis.studies.tune.gain_space import STRUCTURES, GainSpace, make_space, starts_of
+from auv_analysis.studies.tune.gain_space import (
+    BEST,
+    STRUCTURES,
+    GainSpace,
+    make_space,
+    starts_of,
+)
 from auv_analysis.studies.tune.search import Optimum, TunedLaw
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 from auv_gvc_controller.control.gains import sampling_warning
@@ -52,6 +59,13 @@ def test_structures_are_what_they_say() -> None:
         space = space_of('cl', structure)
         ends = np.exp([space.low[0], space.high[0]])
         assert ends == pytest.approx([about.low * least, about.high * most])
+
+
+def test_every_structure_that_can_be_asked_for_has_its_own_words() -> None:
+    tune = main.parser(['tune']).children['tune']
+    (asked,) = (action for action in tune._actions if action.dest == 'structure')
+    assert [BEST, *STRUCTURES] == list(asked.choices)
+    assert len(set(STRUCTURES.values())) == len(STRUCTURES)
 
 
 def test_the_rate_margin_ends_where_the_sampled_loop_begins_to_ring() -> None:

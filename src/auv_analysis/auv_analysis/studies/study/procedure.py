@@ -35,9 +35,9 @@ METHODS = {'sobol': 'Sobol’', 'morris': 'Morris'}
 WEIGHTS = {
     'sobol': (
         'total index',
-        'share of the variance that this gain makes, alone and with the others',
+        'share of the variance that the gain makes, alone and with others (the sum may exceed 1)',
     ),
-    'morris': ('effect μ*', 'mean change of the logarithm over the whole range of this gain'),
+    'morris': ('effect μ*', 'mean change of the logarithm over the whole range of the gain'),
 }
 HEADS: dict[str, Shown] = {
     'kpi': 'KPI',
@@ -196,7 +196,7 @@ def _plot(found: Sensitivity) -> Drawn:
     shown = {kpi: rows for kind in SHOWN for kpi, rows in found.kpis.items() if kpi.name == kind}
     if not shown:
         return None, title, f'{title}: nothing to draw.'
-    sobol = found.method == 'sobol'
+    group, meaning = WEIGHTS[found.method]
     figure = plots.new_figure(ROW * len(shown) + 0.9)
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1.5, 1.0))
     weights = np.array([
@@ -207,17 +207,11 @@ def _plot(found: Sensitivity) -> Drawn:
     plots.draw_grid(right, HeatMap(weights, heads, '', 'Blues', decimals=2), fontsize=7.5)
     _bars(left, shown)
     plots.letter(left, 0, 'spread, 95 % interval')
-    plots.letter(right, 1, 'total index $S_T$' if sobol else r'$\mu^*$')
-    what = (
-        'share of its variance that each gain makes, alone and with the others (total index of '
-        'Sobol’; the sum may exceed 1)'
-        if sobol
-        else 'mean change of its logarithm over the whole range of each gain (Morris)'
-    )
+    plots.letter(right, 1, group)
     caption = (
         f'{title}: (a) standard deviation of the logarithm of a KPI when every gain is '
         f'multiplied by a number of its own between 1/{plain(found.span)} and '
-        f'{plain(found.span)}; (b) {what}.'
+        f'{plain(found.span)}; (b) {group} after {METHODS[found.method]}: {meaning}.'
     )
     return figure, title, caption
 

@@ -18,11 +18,11 @@ from auv_gvc_controller.control.gains import body_gains, velocity_rates
 from auv_gvc_controller.laws.law import SHIPPED, make_gains
 from auv_gvc_controller.laws.model import ControlModel
 
-STRUCTURES = {
-    'scalar': 'a number times the identity',
-    'mass': 'a number times the diagonal of M',
-    'diagonal': 'six numbers',
-    'inertia': 'a number times M',
+STRUCTURES = {  # what a gain multiplies
+    'scalar': 'times the smallest to the largest M_ii: one number',
+    'mass': 'times M_ii of each axis',
+    'diagonal': 'times M_ii of each axis, six numbers',
+    'inertia': 'times M',
 }
 EDGE = 1e-3  # of the distance of two bounds: a value that is nearer to one lies on it
 BEST = 'best'  # the better of `scalar` and `mass`

@@ -19,6 +19,7 @@ from auv_analysis.report.results import (
     terminal,
 )
 from auv_analysis.report.scenario_text import gain_text
+from auv_analysis.studies.tune.gain_space import STRUCTURES
 from auv_analysis.studies.tune.plots import draw_tuning
 from auv_analysis.studies.tune.results import LEVEL, Comparison, Tuning
 from auv_analysis.studies.tune.search import FINALISTS, LONG, POINTS, SHORT, STARTS
@@ -47,12 +48,6 @@ SAME_LAW = (
     'same law: what tells them apart is the off-diagonal part of their gains alone.'
 )
 CONTROLLER = described('controller', 'as in scenario.yaml of this folder')
-MULTIPLES = {
-    'scalar': 'times the smallest to the largest M_ii: one number',
-    'mass': 'times M_ii of each axis',
-    'diagonal': 'times M_ii of each axis, six numbers',
-    'inertia': 'times M',
-}
 SPREADS = {
     'mass': ('relative error of M_RB and of the weight', ''),
     'added_mass': ('relative error of M_A', ''),
@@ -202,7 +197,7 @@ def _searched(results: Results) -> Table:
         for i, search in enumerate(entry.get('searches', [])):
             at = 'controllers', name, 'searches', i
             for gain, bounds in search['searched'].items():
-                times = MULTIPLES[search['structure']] if bounds['times_inertia'] else 'itself'
+                times = STRUCTURES[search['structure']] if bounds['times_inertia'] else 'itself'
                 rows.append({
                     'controller': name,
                     'structure': search['structure'],

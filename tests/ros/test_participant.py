@@ -8,11 +8,12 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from helpers.node_processes import PATIENCE, Peer, fresh_domain
+from rclpy.context import Context
 from rclpy.node import Node
 
-from auv_dynamics.files.errors import on_signals
+from auv_dynamics.files.errors import InputError, on_signals
 from auv_dynamics.ros import topics
-from auv_dynamics.ros.participant import Watcher
+from auv_dynamics.ros.participant import Participant, Watcher
 from auv_dynamics.ros.security import loopback
 
 CALLS: list[tuple[str, str, Callable[[Watcher], Any]]] = [
@@ -43,6 +44,18 @@ def peer(graph: Watcher) -> Iterator[Peer]:
     made = Peer(graph._context.get_domain_id())
     yield made
     made.close()
+
+
+def test_who_cannot_be_made_leaves_the_domain() -> None:
+    contexts: list[Context] = []
+
+    def refuse(context: Context) -> Node:
+        contexts.append(context)
+        raise InputError('x', 'y', 'z', 'w')
+
+    with pytest.raises(InputError):
+        Participant(fresh_domain(), refuse)
+    assert not contexts[0].ok()
 
 
 def until(graph: Watcher, done: Callable[[], bool]) -> None:

@@ -402,6 +402,8 @@ def test_a_bag_spans_what_was_recorded(
             stamp = begin + k * STEP
             peer.publish(topics.ODOM, convert.odometry(stamp, UPRIGHT, FRAMES))
             peer.publish(topics.WRENCH, convert.wrench(stamp, (0.0,) * 6, FRAMES))
+        far = convert.twist((2**31 - 1) * NANOSECONDS, (0.0,) * 6, FRAMES)  # of another clock
+        peer.publish(topics.CMD_VEL, far)
         broken = convert.wrench(0, (0.0,) * 6, FRAMES)
         broken.header.stamp = Time(sec=-1)
         peer.until(lambda: peer.heard['recorder/progress'], 'the steps')
@@ -411,7 +413,7 @@ def test_a_bag_spans_what_was_recorded(
         assert stop(processes['recorder_node'])[0] == 0
     found = logged(bag)
     assert len(found['/epoch']) == 3
-    assert len(found['/wrench']) == 4
+    assert (len(found['/wrench']), len(found['/cmd_vel'])) == (4, 1)
     assert [m.log_time for m in found['/odom']] == [begin + k * STEP for k in range(3)]
     times = [message.log_time for messages in found.values() for message in messages]
     assert max(times) - min(times) < 2 * PATIENCE * NANOSECONDS

@@ -302,10 +302,10 @@ def test_waits_for_a_subscriber_that_is_stopped(tmp_path: Path) -> None:
     steps, domain = 8000, fresh_domain()
     bag = odometry_alone(tmp_path / 'bag.mcap', steps)
     recorder = start_node(
-        'recorder_node', domain, '-p', 'topics:=["odom"]',
+        'recorder_node', domain, '-p', 'topics:=["odom"]', '-r', '__ns:=/replay',
         *parameters(bag=tmp_path / 'again', duration=(steps - 1) * STEP / 1e9),
     )  # fmt: skip
-    values = {'original_names': True, 'expected_subscribers': ['odom=1'], 'start_paused': True}
+    values = {'expected_subscribers': ['odom=1'], 'start_paused': True}
     try:
         with playing(bag, domain=domain, **values, rate=0.0) as (peer, replay):
             peer.until(lambda: replay.playing and asks(replay), 'the recorder')
@@ -321,7 +321,7 @@ def test_waits_for_a_subscriber_that_is_stopped(tmp_path: Path) -> None:
     finally:
         recorder.send_signal(signal.SIGCONT)
         print(stop(recorder))
-    assert read_bag(tmp_path / 'again', decode=False).counts['/odom'] == steps
+    assert read_bag(tmp_path / 'again', decode=False).counts['/replay/odom'] == steps
 
 
 def test_who_cannot_be_asked_is_not_waited_for() -> None:

@@ -304,6 +304,7 @@ def test_the_options_say_which_part_is_played_how_often_and_under_which_names(
     assert (document['start'], document['gaps']) == (0.1, [{'from': 0.19, 'to': 100.0}])
     assert 0.0 <= document['duration'] <= 99.9
     assert document['loops'] >= 2
+    assert f'topics, {document["loops"]} loops and ' in errors
     assert 'nothing from 0.19 to 100 s of the bag: jumped over' in errors
 
 

@@ -185,6 +185,14 @@ def test_bursts_of_topics_do_not_multiply_the_files(tmp_path: Path) -> None:
     assert len(list((tmp_path / 'bag').glob('*.mcap'))) == 5
 
 
+def test_a_clock_that_is_set_back_begins_a_file_as_well(tmp_path: Path) -> None:
+    writer = writer_of(tmp_path / 'bag', max_duration=100 * STEP)
+    for k in (*range(300), *range(300)):
+        writer.write('/a', k * STEP, said(''))
+    writer.close()
+    assert len(list((tmp_path / 'bag').glob('*.mcap'))) == 6
+
+
 def test_a_topic_that_begins_a_file_and_falls_silent(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -62,7 +62,7 @@ def test_a_fault_that_follows_at_once_is_not_looked_at(made):
     assert windows_of(next_one, both) == ((14.0, 14.0), (14.0, 18.0), (18.0, 22.0))
     found = {(one.mark.number, one.dof): one for one in responses(both)}
     first, second = found[1, 'sway'], found[2, 'sway']
-    assert (first.rms[2], first.recovery, first.until) == (None, None, None)
+    assert (first.rms[2], first.recovery, first.until) == (None, None, 14.0)
     assert (second.rms[0], second.until) == (None, 30.0)
     together = LOST._replace(number=3)
     assert windows_of(LOST, replace(made, faults=(LOST, together)))[2] == (14.0, 18.0)

@@ -451,6 +451,12 @@ def test_with_lift_a_hint_lays_it_to_too_little():
     )
 
 
+def test_the_munk_moment_of_a_torpedo():
+    X_udot, Y_vdot = -0.93, -35.5
+    M_A = -np.diag([X_udot, Y_vdot, Y_vdot, -0.0704, -4.88, -4.88])
+    assert munk_terms(M_A)[5, 1] == pytest.approx(Y_vdot - X_udot)
+
+
 def test_munk_terms_are_the_slopes_of_the_coriolis_wrench():
     M = load_vehicle('rexrov').M
     vehicle, h = load_vehicle('rexrov'), 1e-6

@@ -224,7 +224,7 @@ class BagFile:
         longest, largest = self._storage.max_duration, self._storage.max_size
         if not (longest or largest) or not self._since:
             return False  # a file holds one message at least
-        if longest and log_time - self._since.get(topic, log_time) >= longest:
+        if longest and abs(log_time - self._since.get(topic, log_time)) >= longest:
             # topics come in bursts of their own: one tells the time, others only in its silence
             silent = time.monotonic() - self._heard > SILENCE
             if silent or topic == self._pace:

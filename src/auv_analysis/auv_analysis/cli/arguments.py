@@ -255,7 +255,7 @@ def add_frames(command: argparse.ArgumentParser) -> None:
 
 def add_no_report(command: argparse.ArgumentParser) -> None:
     """Whether there is a report."""
-    text = 'summary.json alone: no plots, no page'
+    text = 'no plots, no page'
     command.add_argument('--no-report', action='store_true', help=text)
 
 

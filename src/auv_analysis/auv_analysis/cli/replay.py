@@ -221,7 +221,8 @@ def _concluded(document: dict[str, Any], node: Any) -> dict[str, Any]:
     if node.exit_code == 2:
         sys.exit(2)  # the node has said why
     text = f'{document["messages"]} messages of {len(document["topics"])} topics'
-    say(f'{text}, {document["duration"]:g} s of the bag in {document["elapsed"]:.1f} s')
+    loops = f'{document["loops"]} loops and ' if node.plan.settings.loop else ''
+    say(f'{text}, {loops}{document["duration"]:g} s of the bag in {document["elapsed"]:.1f} s')
     if node.exit_code == 1:
         stopped = node.player.guard.stopped
         raise FailedError(f'commands were stopped: {stopped}' if stopped else node.failure)

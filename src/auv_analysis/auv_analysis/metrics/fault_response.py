@@ -148,8 +148,8 @@ class _Recovery:
     @property
     def until(self) -> float | None:
         """When the time that is looked at ends, s; None where the fault has no end."""
-        run = self._run
-        return min(self._until, run.start + run.duration) if self._seen else None
+        last = self._run.start + self._run.duration
+        return min(self._until, last) if self._mark.end <= last + 1e-6 * self._run.step else None
 
     def time(self, i: int) -> float | None:
         """Seconds until one of them has settled; None: it has not."""

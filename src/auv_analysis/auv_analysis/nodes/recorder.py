@@ -187,15 +187,20 @@ class GraphClock:
         self._node, self._strict, self.latest = node, strict, -1
         self.simulated = strict or bool(node.get_parameter('use_sim_time').value)
         self._offset: int | None = None
+        self._newest: int | None = None  # stamp of a step
         self.early: list[Entry] = []
         self._since = 0.0  # steady s
 
     def follow(self, ns: int) -> None:
         """Note the stamp of a step."""
-        self.latest = max(self.latest, ns)
+        self.latest, self._newest = max(self.latest, ns), ns
         if self._offset is None:
             apart = ns - self._node.get_clock().now().nanoseconds
             self._offset = apart if abs(apart) > EPOCH else 0
+
+    def is_near(self, ns: int) -> bool:
+        """Whether a stamp is of the epoch of the newest step, as far as that is known."""
+        return self._newest is None or abs(ns - self._newest) <= EPOCH
 
     def now(self, received: int | None) -> int | None:
         """Time in ns of a message that came at `received` of the system's; None: not known yet."""

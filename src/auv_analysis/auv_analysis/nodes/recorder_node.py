@@ -174,10 +174,11 @@ class RecorderNode(BulkNode):
             except BadMessageError:
                 self._take(resolved, kind, message, way)
                 raise
-            if timed and (ns or zero_is_a_time):
-                if step_topic:
-                    self._time.follow(ns)
-                    self._release()
+            stamped = timed and (ns or zero_is_a_time)
+            if stamped and step_topic:
+                self._time.follow(ns)
+                self._release()
+            if stamped and (topic is topics.CLOCK or self._time.is_near(ns)):
                 published = (of_a_step and way.get('source_timestamp')) or ns
                 self._write(resolved, kind, message, ns, published)
             else:

@@ -176,7 +176,7 @@ class FrameConverterNode(BulkNode):
 
     def _untaken(self) -> str:
         heard_by = hearers(self, self._commanded)
-        idle = sum(looks_on(self, one) or not acts(one) for one in heard_by)
+        idle = sum(looks_on(self.get_namespace(), one) or not acts(one) for one in heard_by)
         if self._commanded.get_subscription_count() > idle:
             return ''
         return f'{_theirs(topics.WRENCH).name}: expected a subscriber, found none'

@@ -103,12 +103,12 @@ def why_silent(node: Node, topic: Topic) -> str:
     return f'{name}: expected {expected}, found {other} of {full_name(found[0])}; {remedy}'
 
 
-def onlookers(node: Node, publisher: Any) -> int:
-    """How many that hear a publisher are not of its graph, or may turn out not to be.
+def onlookers(node: Node, publisher: Any, namespace: str) -> int:
+    """How many that hear a publisher are not of the graph in a namespace, or may turn out not to.
 
     These are observers, the recorder of another namespace, and tools: `ros2 bag`, `ros2 topic`.
     """
-    return sum(looks_on(node, one) for one in hearers(node, publisher))
+    return sum(looks_on(namespace, one) for one in hearers(node, publisher))
 
 
 def hearers(node: Node, publisher: Any) -> list[Any]:
@@ -125,10 +125,10 @@ def hearers(node: Node, publisher: Any) -> list[Any]:
     ]
 
 
-def looks_on(node: Node, endpoint: Any) -> bool:
-    """Whether a subscription is not of the graph of a node, or may turn out not to be."""
+def looks_on(namespace: str, endpoint: Any) -> bool:
+    """Whether a subscription is not of the graph in a namespace, or may turn out not to be."""
     name = endpoint.node_name
-    foreign = name == interface.RECORDER and endpoint.node_namespace != node.get_namespace()
+    foreign = name == interface.RECORDER and endpoint.node_namespace != namespace
     return foreign or name == UNNAMED or observes(endpoint) or name.startswith(TOOLS)
 
 

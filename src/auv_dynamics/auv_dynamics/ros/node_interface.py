@@ -298,7 +298,7 @@ class NodeInterface:
             publisher = self.publishers.get(topic)
             found = publisher.get_subscription_count() if publisher else 0
             if publisher and found >= count:  # who only looks on is not waited for, nor counted
-                found -= onlookers(self.node, publisher)
+                found -= onlookers(self.node, publisher, self.node.get_namespace())
             if found < count:
                 return f'{topic}: expected {count} subscribers, found {found}'
         return ''

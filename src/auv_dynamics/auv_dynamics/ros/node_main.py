@@ -235,7 +235,7 @@ def live(makes: Sequence[Callable[[], Any]], args: list[str] | None = None) -> i
         print(error, file=sys.stderr, flush=True)
         code = 2
     except (rclpy.exceptions.ROSInterruptException, ExternalShutdownException):
-        code = 0
+        pass
     # a parameter file that is no YAML, keys that are not there; what rclpy declares itself
     except (RCLError, rclpy.exceptions.ParameterException) as error:
         print(first_line(error), file=sys.stderr, flush=True)
@@ -287,7 +287,7 @@ def serve(node: Any, executor: SingleThreadedExecutor, timeout: float) -> bool:
         callback.result()
     except TimeoutException:
         return False
-    # a transition that does not exist, a broken request, a parameter of a type that does not
+    # a broken request, a parameter of a type that does not exist
     except (RCLError, RMWError, ValueError) as error:
         if isinstance(error, ValueError) and not isinstance(entity, Service):
             raise

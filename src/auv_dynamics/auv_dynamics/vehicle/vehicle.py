@@ -52,7 +52,7 @@ def rigid_body_matrix(
 def munk_terms(M: np.ndarray) -> np.ndarray:
     """What inertia adds to SNAME's derivatives by u: coefficient (i, j) of u nu_j in -C(nu) nu.
 
-    With the added mass of a torpedo alone, [5][1] is the Munk moment X_udot - Y_vdot, a part of a
+    With the added mass of a torpedo alone, [5][1] is the Munk moment Y_vdot - X_udot, a part of a
     combined N_uv; column 0 is zero. (6, 6) of a symmetric M (6, 6).
     """
     flat, ahead, product = row_major(M), tuple(np.eye(6)[0]), plain(coriolis)

@@ -6,6 +6,7 @@ import time
 from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import fields
+from functools import partial
 from typing import Any, NamedTuple
 
 from rcl_interfaces.msg import SetParametersResult
@@ -15,7 +16,7 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
 from auv_dynamics import load_vehicle
-from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.errors import InputError, first_line
 from auv_dynamics.files.nearest import one_of as nearest_of
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.endpoints import why_silent
@@ -31,6 +32,7 @@ from auv_dynamics.ros.node_interface import (
 )
 from auv_dynamics.ros.node_main import BulkMixin, main_of
 from auv_dynamics.ros.parameters import declare, given, refuse_unknown
+from auv_dynamics.ros.rclpy_internals import RCLError
 from auv_dynamics.ros.settings import name_of
 from auv_gvc_controller.control.controller import Answer, VelocityController
 from auv_gvc_controller.control.odometry_guard import UNTIMED, Now
@@ -248,6 +250,8 @@ class ControllerNode(BulkMixin, LifecycleNode):
         self._idle = Idle(self, self._settings.acceleration == SAME)
         self.graph.in_trouble_while(self._trouble)
         self._subscribe()
+        for service in self.services:
+            service.callback = partial(self._answer, service.callback)
         self.create_service(Trigger, '~/reset', self._on_reset)
         steady_timer(self, WATCH_LOCKSTEP if self._settings.lockstep else WATCH, self._watch)
         if self._settings.autostart:
@@ -297,6 +301,14 @@ class ControllerNode(BulkMixin, LifecycleNode):
         """Leave the vehicle without a wrench; success leads to unconfigured, and on from there."""
         self._leave()
         return SUCCESS
+
+    def _answer(self, callback: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
+        """Answer of rclpy's services; it leaves a transition that does not exist without one."""
+        try:
+            return callback(request, response)
+        except RCLError as error:
+            self.get_logger().error(f'refused: {first_line(error)}')
+            return response
 
     def _leave(self) -> None:
         self._let_go()

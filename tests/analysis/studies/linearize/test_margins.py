@@ -302,9 +302,10 @@ def test_a_rotors_lag_counts_where_the_plant_has_it():
 
 def test_rotors_of_every_order_filter_their_own_thrusts():
     random, s = np.random.default_rng(3), 7.0j
-    A, B, into, out = (random.normal(size=n) for n in ((8, 8), (8, 6), (5, 6), (6, 5)))
+    A, B, into, out = (random.normal(size=n) for n in ((8, 8), (8, 6), (6, 6), (6, 6)))
     rotors = [Rotor(lag=0.2), Rotor(omega=9.0, zeta=0.3), Rotor(), Rotor(omega=5.0), Rotor(lag=1.0)]
-    filters = [1 / (0.2 * s + 1), 81 / (s**2 + 5.4 * s + 81), 1, 25 / (s + 5) ** 2, 1 / (s + 1)]
+    rotors.append(Rotor(lag=1e-60))  # beside 1e60 the rates of the plant would be lost
+    filters = [1 / (0.2 * s + 1), 81 / (s**2 + 5.4 * s + 81), 1, 25 / (s + 5) ** 2, 1 / (s + 1), 1]
     lagged, forced = behind_rotors(A, B, rotors, into, out)
     assert len(lagged) == 8 + 1 + 2 + 2 + 1
     found = np.linalg.solve(s * np.eye(len(lagged)) - lagged, forced)[:8]

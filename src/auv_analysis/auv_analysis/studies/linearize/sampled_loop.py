@@ -15,6 +15,8 @@ from scipy.linalg import block_diag, expm
 
 from auv_dynamics.vehicle.thrusters import Rotor
 
+LEAST_LAG = 1e-9  # s, the least step of a scenario: what is faster follows at once
+
 
 def behind_rotors(
     A: np.ndarray, B: np.ndarray, rotors: Sequence[Rotor], into: np.ndarray, out: np.ndarray
@@ -51,7 +53,7 @@ def _rates(rotor: Rotor) -> np.ndarray:
     """F (q, q) of a rotor, q its order."""
     if rotor.omega:
         return np.array([[0.0, 1.0], [-(rotor.omega**2), -2 * rotor.zeta * rotor.omega]])
-    return np.array([[-1 / rotor.lag]]) if rotor.lag else np.zeros((0, 0))
+    return np.array([[-1 / rotor.lag]]) if rotor.lag > LEAST_LAG else np.zeros((0, 0))
 
 
 class HeldInput(NamedTuple):

@@ -9,9 +9,10 @@ import pytest
 import yaml
 from helpers.foreign_bags import SECOND, loaded, nanoseconds, simulated, write, write_chunks
 from helpers.foreign_logs import SENSORS, every, maker
-from helpers.made_messages import geometry, header
+from helpers.made_messages import geometry, header, new, serialized
 from numpy.testing import assert_allclose
 
+from auv_analysis.bag.any_bag import decoder
 from auv_analysis.bag.foreign_fields import MessageReader, factor, presets
 from auv_analysis.bag.foreign_messages import read_sources
 from auv_analysis.bag.foreign_topics import read_mapping
@@ -19,6 +20,8 @@ from auv_analysis.bag.foreign_tracks import tracks_of
 from auv_analysis.runs.run import Run
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
+
+JOINTS = 'sensor_msgs/msg/JointState'
 
 
 def written(keys: dict[str, Any], folder: Path) -> Path:
@@ -63,6 +66,34 @@ def test_a_motion_out_of_five_topics_of_nobodys_types(kind, run, tmp_path) -> No
     notes = '\n'.join(found.notes)
     assert '/imu: every stamp is zero, so the time of logging is taken' in notes
     assert '/imu: p, q, r in deg/s, turned into rad/s' in notes
+
+
+def test_unused_bytes_behind_empty_sequences_are_not_read() -> None:
+    """As rmw_fastrtps_cpp serializes thrusts that have neither position nor velocity."""
+    none = np.zeros(0)
+    message = new(JOINTS, header(0, ''), [], none, none, np.array([1.0, 2.0]))
+    decode = decoder(JOINTS, '', 'msg', 'cdr')
+    for little in (True, False):
+        data = serialized(message, little=little)
+        assert decode(data + b'\xff' * 12).effort.tolist() == [1.0, 2.0]
+        for wrong, said in (
+            (data + bytes(20), '20 bytes behind a message of 48'),
+            (data[:-1], r'(?i)buffer|sequence'),
+            (b'\0\7' + data[2:], 'CDR of kind 0007'),
+        ):
+            with pytest.raises(Exception, match=said):
+                decode(wrong)
+    layout, kind = new('std_msgs/msg/MultiArrayLayout', [], 0), 'std_msgs/msg/UInt8MultiArray'
+    data = serialized(new(kind, layout, np.zeros(0, np.uint8)))
+    with pytest.raises(ValueError, match='4 bytes behind a message of 12'):
+        decoder(kind, '', 'msg', 'cdr')(data + bytes(4))
+
+
+def test_a_definition_may_have_line_ends_of_windows() -> None:
+    text = 'std_msgs/Header header  # stamped\r\nfloat64 newton\r\n'
+    text += '=' * 80 + '\r\nMSG: std_msgs/Header\r\nuint32 seq\r\n'
+    read = decoder('rov_msgs/msg/Thrust', text, 'msg', 'cdr')
+    assert read(b'\0\1\0\0' + bytes(8) + np.float64(2.5).tobytes()).newton == 2.5
 
 
 @pytest.mark.parametrize(('name', 'unit', 'size'), [

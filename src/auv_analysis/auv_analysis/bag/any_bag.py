@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import zstandard
 from mcap.records import Channel
+import numpy as np
 
 from auv_analysis.bag.chunks import MessageTable
 from auv_analysis.bag.csv_logs import rows_of_csv, survey_of_csv
@@ -30,7 +31,8 @@ from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import read_yaml
 
 if TYPE_CHECKING:
-    from rosbags.interfaces import Connection
+    from rosbags.interfaces import Connection, Msgdef
+    from rosbags.typesys.store import Typestore
 
 Result = TypeVar('Result')
 Decoder = Callable[[bytes], Any]
@@ -253,9 +255,34 @@ def decoder(name: str, definition: str, language: str, encoding: str) -> Decoder
         text = part.partition('\n')[2] if part.startswith('IDL: ') else part
         if text.strip():
             store.register(get_types_from_idl(text))
-    store.get_msgdef(name)  # that the definition defines it shows here
-    read = store.deserialize_cdr if encoding == 'cdr' else store.deserialize_ros1
-    return partial(read, typename=name)
+    kind = store.get_msgdef(name)  # that the definition defines it shows here
+    if encoding == 'cdr':
+        return partial(_of_cdr, store, kind)
+    return partial(store.deserialize_ros1, typename=name)
+
+
+def _of_cdr(store: 'Typestore', kind: 'Msgdef[object]', data: bytes) -> Any:
+    """A message, which may have unused bytes behind it: `deserialize_cdr` allows 3.
+
+    Fast CDR reserves up to 8 more for each empty sequence of 8-byte numbers, and leaves in them
+    what the memory held.
+    """
+    if data[:2] not in (b'\0\0', b'\0\1'):
+        raise ValueError(f'CDR of kind {data[:2].hex()}')
+    read = kind.deserialize_cdr_le if data[1] else kind.deserialize_cdr_be
+    message, end = read(data[4:], 0, kind.cls, store)
+    unused = len(data) - 4 - end
+    if unused > 3 and unused > 3 + 8 * _empty_sequences(message):
+        raise ValueError(f'{unused} bytes behind a message of {end}')
+    return message
+
+
+def _empty_sequences(part: Any) -> int:
+    """Number of empty sequences of 8-byte numbers in a message."""
+    if isinstance(part, np.ndarray):
+        return int(part.dtype.itemsize == 8 and not len(part))
+    inside = part if isinstance(part, list) else getattr(part, '__dict__', {}).values()
+    return sum(map(_empty_sequences, inside))
 
 
 def decoder_of(path: Path, topic: str, how: tuple[str, str, str, str]) -> Decoder:
@@ -264,6 +291,7 @@ def decoder_of(path: Path, topic: str, how: tuple[str, str, str, str]) -> Decode
 
 
 def decoded(path: Path, topic: str, decode: Decoder, data: bytes) -> Any:
+    definition = definition.replace('\r\n', '\n')  # which the parser stumbles over
     """A message; InputError, which names its topic, where it cannot be decoded."""
     if len(data) > LARGEST_DECODED:
         expected = f'messages of at most {LARGEST_DECODED} bytes'

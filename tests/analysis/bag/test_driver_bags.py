@@ -161,6 +161,26 @@ def test_of_a_clock_that_begins_anew_the_longest_stretch_is_read(
     )
 
 
+@pytest.mark.parametrize('ms', [0, 10**9])
+def test_an_odometry_of_another_time_is_left_out_and_counted(tmp_path: Path, ms: int) -> None:
+    bag = Bag(tmp_path / 'bag.mcap', chunk_size=2000)
+    bag.attach('vehicle.yaml', VEHICLE)
+    bag.attach(RECORDING, recording_text(False, {}))
+    for k in range(100):
+        ns = (1000 + GRID * k) * MS
+        made = stamped('Wrench', ns, [float(k)] * 6)
+        bag.add('/odom', ODOMETRY, ns, serialized(odometry(ms * MS if k == 50 else ns, state(k))))
+        bag.add('/wrench', made.__msgtype__, ns, serialized(made))
+    path = bag.close()
+    run, mapped = load_run(path), open_bag(path, whole=1).run
+    for one in (run, joined([*mapped.blocks(30)])):
+        assert_array_equal(one.eta[:, 0], [k for k in range(100) if k != 50])
+    assert run.notes == (
+        'odom: 1 of 100 messages were left out: their stamps are far off those around them',
+        'wrench: 1 of 100 messages are not complete on all topics',
+    )
+
+
 def test_a_topic_with_another_clock_is_said(tmp_path: Path) -> None:
     run = load_run(begun_anew(tmp_path, 200, 150, 0))
     assert 'wrench: its clock jumps back 0 times: what it says may be of another time' in run.notes

@@ -18,7 +18,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis.bag.foreign_messages import Recorded, longest_stretch, on_the_clock, ordered
 from auv_analysis.bag.foreign_topics import MappedTopic
-from auv_analysis.bag.foreign_tracks import _on_one_clock, _track
+from auv_analysis.bag.foreign_tracks import _on_one_clock, _retimed, _track
 from auv_analysis.runs.run import Run
 from auv_dynamics.files.errors import InputError
 
@@ -63,6 +63,25 @@ def test_of_a_clock_that_begins_anew_the_longest_stretch_is_read() -> None:
                      'stretches, left 5 messages']  # fmt: skip
     small = recorded([0, SECOND, SECOND // 2, 2 * SECOND])
     assert longest_stretch(small, notes) is small, 'a late message is no new beginning'
+
+
+def test_a_single_message_of_another_time_is_left_out_and_counted() -> None:
+    notes: list[str] = []
+    seconds = np.array([10, 11, 12, 0, 14, 15, 900, 17, 18])
+    found = longest_stretch(recorded(seconds * SECOND), notes)
+    assert_array_equal(found.rows[:, 0], [0, 1, 2, 4, 5, 7, 8])
+    assert notes == ['/twist: 2 of 9 messages were left out: their stamps are far off those around '
+                     'them']  # fmt: skip
+    in_turn = longest_stretch(recorded(np.array([0, 900, 1, 901, 2, 902]) * SECOND), notes)
+    assert_array_equal(in_turn.rows[:, 0], [0, 1])
+    little = longest_stretch(recorded(np.array([990, 1000, 885, 910, 940]) * SECOND // 100), notes)
+    assert len(little.rows) == 3, 'a clock that begins anew by little'
+
+
+def test_a_pause_makes_no_bursts() -> None:
+    notes: list[str] = []
+    _retimed(recorded(np.r_[np.arange(50), 10**6 + np.arange(50)] * 10**7), notes)
+    assert not notes
 
 
 def test_logged_times_are_put_on_another_clock() -> None:

@@ -19,7 +19,7 @@ from auv_analysis.bag.foreign_fields import (
 )
 from auv_analysis.bag.foreign_topics import HELD, MappedTopic, TopicMap, other_odometries
 from auv_analysis.bag.metadata import is_csv
-from auv_analysis.bag.reading import stretches
+from auv_analysis.bag.reading import strays, stretches
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant
 from auv_dynamics.ros.interface import NANOSECONDS
@@ -87,7 +87,9 @@ def on_the_clock(of: Recorded, clock: Recorded, notes: list[str]) -> Recorded:
 
 
 def longest_stretch(of: Recorded, notes: list[str]) -> Recorded:
-    """The longest part, in messages, in which the clock never starts anew."""
+    """The longest part, in messages, in which the clock never starts anew, without stray stamps."""
+    stray = strays(of.stamps, of.source.topic, notes)
+    of = of.part(~stray) if stray.any() else of
     edges = stretches(of.stamps)
     times = len(edges) - 2
     if not times:

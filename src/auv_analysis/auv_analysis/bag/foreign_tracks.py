@@ -168,11 +168,12 @@ def _retimed(one: Recorded, notes: list[str]) -> Recorded:
         stamps = even
     elif len(stamps) > ENOUGH:
         apart = np.diff(stamps)
-        share = float(np.mean(apart < BURST * apart.mean()))
+        mean = np.minimum(apart, usual_limit(stamps)).mean()  # between gaps
+        share = float(np.mean(apart < BURST * mean))
         if share > BURSTS:
             notes.append(
                 f'{source.topic}: its stamps come in bursts, {100 * share:.0f} % of the intervals '
-                f'are below a fifth of the mean of {apart.mean() / NANOSECONDS:.3g} s; '
+                f'are below a fifth of the mean of {mean / NANOSECONDS:.3g} s; '
                 'stamps: uniform in the map spreads them evenly'
             )
     if source.delay:

@@ -14,6 +14,7 @@ from auv_analysis.bag.reading import (
     gathered,
     read_bag,
     slices,
+    strays,
     stretches,
     usual_limit,
 )
@@ -84,7 +85,7 @@ def open_bag(
     bag, contents = Path(bag), read_bag(bag, namespace, whole=whole)
     topics = topics_of_one_graph(contents.messages, contents, bag)
     series = {role: contents.messages.pop(topic) for role, topic in topics.items()}
-    series, begun = longest_stretch(series) if contents.lenient else (series, [])
+    series, begun = longest_stretch(series, whole) if contents.lenient else (series, [])
     controller = attachments.parameters_of(contents, bag).get('controller_node', {})
     held = holds(contents, controller)
     if held:
@@ -222,28 +223,36 @@ def _namespace(topics: set[str], contents: BagContents, bag: Path) -> str:
     return whole[0] if whole else spaces[0]
 
 
-def longest_stretch(series: Mapping[str, Series]) -> tuple[dict[str, Series], list[str]]:
+def longest_stretch(
+    series: Mapping[str, Series], whole: float
+) -> tuple[dict[str, Series], list[str]]:
     """The part of each topic in which the odometry goes on longest, and notes on what is left out.
 
-    Where a clock begins anew, that of every topic does, but for one that has another clock.
+    Where a clock begins anew, that of every topic does, but for one that has another clock. Before,
+    single messages with a stamp of another time are left out.
 
     Parameters
     ----------
     series : role -> stamps in the order of the bag, and rows
+    whole : steps up to which rows that have to be picked are kept in memory
 
     """
-    cuts = {role: stretches(ns) for role, (ns, _) in series.items()}
+    found, notes = dict(series), list[str]()
+    for role, (ns, rows) in series.items():
+        stray = strays(ns, role, notes)
+        if stray.any():
+            found[role] = ns[~stray], _picked(rows, np.flatnonzero(~stray), whole)
+    cuts = {role: stretches(ns) for role, (ns, _) in found.items()}
     edges = cuts[interface.ODOM]
     if len(edges) == 2:
-        return dict(series), []
+        return found, notes
     kept = int(np.argmax(np.diff(edges)))
     times = len(edges) - 2
-    notes = [
+    notes.append(
         f'{interface.ODOM}: the clock jumps back {times} times; read the longest of {times + 1} '
         f'stretches, left {edges[-1] - edges[kept + 1] + edges[kept]} messages'
-    ]
-    found = dict(series)
-    for role, (ns, rows) in series.items():
+    )
+    for role, (ns, rows) in found.items():
         if len(cuts[role]) == len(edges):
             part = slice(*cuts[role][kept : kept + 2])
             found[role] = ns[part], rows[part]

@@ -115,6 +115,24 @@ def stretches(ns: np.ndarray) -> list[int]:
     return [0, *(np.flatnonzero(np.diff(ns) < -BACK) + 1).tolist(), len(ns)]
 
 
+def strays(ns: np.ndarray, topic: str, notes: list[str]) -> np.ndarray:
+    """Which stamps (n,) jump alone in the order of the bag, so that those around go on without it.
+
+    Parameters
+    ----------
+    ns : (n,) stamps
+    topic, notes : gets a line that counts them
+
+    """
+    back, found = np.diff(ns) < -BACK, np.zeros(len(ns), bool)
+    found[1:-1] = (back[:-1] | back[1:]) & (ns[2:] >= ns[:-2])
+    found &= ~np.roll(found, 1) & ~np.roll(found, -1)  # two clocks in turn are no strays
+    if count := np.count_nonzero(found):
+        lost = f'{topic}: {count} of {len(ns)} messages were left out'
+        notes.append(f'{lost}: their stamps are far off those around them')
+    return found
+
+
 def usual_limit(ns: np.ndarray) -> float:
     """Longest pause that is no gap, by the intervals of rising stamps (n,), ns."""
     if len(ns) < 2:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 from helpers.foreign_bags import (
+    SECOND,
     UNNAMED,
     Maker,
     loaded,
@@ -20,6 +21,7 @@ from helpers.foreign_bags import (
 from helpers.foreign_logs import HEADS, SENSORS, columns, every, maker, text_of
 from helpers.made_messages import Bag, new, serialized
 from numpy.testing import assert_allclose
+from rosbags.typesys import get_types_from_msg
 
 from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.foreign_topics import candidates, read_mapping
@@ -88,6 +90,41 @@ def test_an_odometry_of_zeros_is_left_out_and_said(run, tmp_path) -> None:
     assert '# /nav2/odometry: an odometry as well\n' in text
     assert '# /rov/odom: no attitude or no velocity in it but zeros\n' in text
     assert 'frames: enu_flu    # the frame ids odom, base_link of /nav/odometry do not say' in text
+
+
+@pytest.mark.parametrize('kind', ['mcap', 'sqlite3', 'bag'])
+def test_what_begins_late_is_seen(kind, run, tmp_path) -> None:
+    """A vehicle that stays on deck for two thirds of a recording; ranges in every third message."""
+    make, m = maker(ros1=kind == 'bag'), motion(run, enu=True)
+    name = 'rov_msgs/msg/Sonar'
+    make.store.register(get_types_from_msg('float64 t\nfloat64 depth\nfloat64[] ranges\n', name))
+    still = m._replace(position=0.0 * m.position, twist=0.0 * m.twist)
+    messages = []
+    for k in range(3000):
+        ns, late = k * 2 * SECOND, k >= 2000
+        seen = make.odometry(ns, UNNAMED, m if late else still, k % 101)
+        sonar = make.new(name, 2.0 * k, 30.0 * late, np.ones(int(k % 3 == 2)))
+        messages += [('/odom', ns, seen), ('/sonar', ns, sonar)]
+    bag = write(tmp_path / 'dive', messages, make, kind=kind)
+    assert proposed(bag)[1]['odometry'] == {'topic': '/odom'}
+    found = looked_through(bag, survey(bag))['/sonar']
+    assert found.count == 997
+    assert found.spans['depth'].high == 30.0
+    assert found.stamp == ('t', 's')
+    assert 330 < found.spans['ranges[0]'].filled < 335
+
+
+def test_constants_of_a_definition_are_no_fields(tmp_path) -> None:
+    make = maker()
+    for name, text in (
+        ('Esc', 'uint8 IDLE=7\nfloat64 newton\n'),
+        ('Escs', 'rov_msgs/Esc[] motors'),
+    ):
+        make.store.register(get_types_from_msg(text, f'rov_msgs/msg/{name}'))
+    motors = [make.new('rov_msgs/msg/Esc', i + 1.0) for i in range(6)]
+    message = make.new('rov_msgs/msg/Escs', motors)
+    keys = proposed(write(tmp_path / 'dive', [('/esc', 0, message)], make))[1]
+    assert keys['thrusters']['fields'] == [f'motors[{i}].newton' for i in range(6)]
 
 
 def test_what_is_missing_is_a_comment(tmp_path) -> None:
@@ -203,3 +240,5 @@ def test_a_message_that_would_fill_the_memory_is_not_looked_into(tmp_path, capsy
     assert document['topics']['/large']['messages'] == 1
     assert document['fields']['/small']['data[1]']['least'] == 0.0
     assert not document['fields'].get('/large')
+    (note,) = document['notes']
+    assert '/large: expected messages of at most 2097152 bytes' in note

@@ -1,16 +1,18 @@
 """The messages of any bag or log, decoded: by our own readers, or by the rosbags library."""
 
+import math
 import shutil
 import tempfile
-from collections.abc import Callable, Collection, Iterator
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
+import numpy as np
 import zstandard
 from mcap.records import Channel
-import numpy as np
 
 from auv_analysis.bag.chunks import MessageTable
 from auv_analysis.bag.csv_logs import rows_of_csv, survey_of_csv
@@ -71,7 +73,9 @@ def survey(bag: Path) -> BagContents:
     return contents
 
 
-def messages(bag: Path, topics: Collection[str], notes: list[str]) -> Iterator[LoggedMessage]:
+def messages(
+    bag: Path, topics: Collection[str], notes: list[str], shares: Mapping[str, float] | None = None
+) -> Iterator[LoggedMessage]:
     """Messages of some topics in the order of the bag.
 
     Parameters
@@ -79,25 +83,36 @@ def messages(bag: Path, topics: Collection[str], notes: list[str]) -> Iterator[L
     bag : folder or file
     topics : names as the bag has them
     notes : gets a line where a file is damaged or was not finished
+    shares : topic -> which share of its messages comes, evenly; of other topics all come
 
     Raises
     ------
     InputError : not a bag, or messages that cannot be decoded
 
     """
+    met: Counter[str] = Counter()
+
+    def taken(topic: str) -> bool:
+        share = (shares or {}).get(topic, 1.0)
+        met[topic] += 1
+        return math.ceil(met[topic] * share) > math.ceil((met[topic] - 1) * share)
+
     if is_csv(bag):
         yield from (LoggedMessage(*found) for found in rows_of_csv(bag, topics, notes))
     elif is_log(bag):
-        yield from (LoggedMessage(*found) for found in messages_of_log(bag, topics, notes))
+        every = messages_of_log(bag, topics, notes)
+        yield from (LoggedMessage(*found) for found in every if taken(found[0]))
     elif is_mcap(bag):
         for path in bag_files(bag):
-            yield from _of_mcap(path, topics, notes)
+            yield from _of_mcap(path, topics, notes, taken)
     else:
         for part in _parts(bag):
-            yield from _of_rosbags(part, topics)
+            yield from _of_rosbags(part, topics, taken)
 
 
-def _of_mcap(path: Path, topics: Collection[str], notes: list[str]) -> Iterator[LoggedMessage]:
+def _of_mcap(
+    path: Path, topics: Collection[str], notes: list[str], taken: Callable[[str], bool]
+) -> Iterator[LoggedMessage]:
     file = McapFile(path, notes)
     wanted: dict[int, tuple[str, Decoder]] = {}
     for item in file.records():
@@ -110,7 +125,7 @@ def _of_mcap(path: Path, topics: Collection[str], notes: list[str]) -> Iterator[
             wanted[item.id] = item.topic, decode
         elif isinstance(item, MessageTable):
             for i, channel in enumerate(item.channels.tolist()):
-                if channel in wanted:
+                if channel in wanted and taken(wanted[channel][0]):
                     topic, decode = wanted[channel]
                     message = decoded(path, topic, decode, item.payload(i))
                     yield LoggedMessage(topic, int(item.log_times[i]), message)
@@ -130,7 +145,9 @@ def _survey_of_rosbags(bag: Path) -> BagContents:
     return contents
 
 
-def _of_rosbags(bag: Path, topics: Collection[str]) -> Iterator[LoggedMessage]:
+def _of_rosbags(
+    bag: Path, topics: Collection[str], taken: Callable[[str], bool]
+) -> Iterator[LoggedMessage]:
     with _opened(bag) as reader:
         wanted = [c for c in reader.connections if c.topic in topics]
         if not wanted:
@@ -145,8 +162,9 @@ def _of_rosbags(bag: Path, topics: Collection[str]) -> Iterator[LoggedMessage]:
             except Exception as error:  # whatever the library meets in a damaged file
                 raise refusal(bag, '', 'a bag that can be read to its end', error) from None
             topic = connection.topic
-            message = decoded(bag, topic, decoders[connection.id], bytes(data))
-            yield LoggedMessage(topic, log_time, message)
+            if taken(topic):
+                message = decoded(bag, topic, decoders[connection.id], bytes(data))
+                yield LoggedMessage(topic, log_time, message)
 
 
 def _of_connection(bag: Path, connection: 'Connection') -> Decoder:
@@ -248,6 +266,7 @@ def decoder(name: str, definition: str, language: str, encoding: str) -> Decoder
         raise ValueError(f'messages in {encoding or "no encoding"}, described in {language}')
     if len(definition) > LARGEST_PARSED:
         raise ValueError(f'a definition of {len(definition)} bytes, above {LARGEST_PARSED}')
+    definition = definition.replace('\r\n', '\n')  # which the parser stumbles over
     store = get_typestore(Stores.EMPTY if definition else Stores.ROS2_HUMBLE)
     if definition and language == 'msg':
         store.register(get_types_from_msg(definition, name))
@@ -291,7 +310,6 @@ def decoder_of(path: Path, topic: str, how: tuple[str, str, str, str]) -> Decode
 
 
 def decoded(path: Path, topic: str, decode: Decoder, data: bytes) -> Any:
-    definition = definition.replace('\r\n', '\n')  # which the parser stumbles over
     """A message; InputError, which names its topic, where it cannot be decoded."""
     if len(data) > LARGEST_DECODED:
         expected = f'messages of at most {LARGEST_DECODED} bytes'

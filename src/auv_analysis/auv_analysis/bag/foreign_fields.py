@@ -6,6 +6,7 @@ A standard message type is a preset of paths; a mapping may name the paths of an
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import MISSING
 from functools import partial
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -372,8 +373,10 @@ def numbers(message: Any, path: str = '') -> Iterator[tuple[str, float]]:
         for i, part in enumerate(message if len(message) <= WIDEST else ()):
             yield from numbers(part, f'{path}[{i}]')
     elif hasattr(message, '__dict__'):
+        declared = getattr(message, '__dataclass_fields__', {})
         for name, part in vars(message).items():
-            if not name.startswith('_'):
+            constant = name in declared and declared[name].default is not MISSING
+            if not (constant or name.startswith('_')):
                 yield from numbers(part, f'{path}.{name}' if path else name)
 
 

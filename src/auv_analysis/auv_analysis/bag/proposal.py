@@ -32,8 +32,8 @@ from auv_dynamics.files.yaml_files import yaml_text
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle.frames import ENU_FLU, NED_FSD, named_axes
 
-LOOKED = 50_000  # messages of a log, and of a topic those whose numbers are looked at
-OF_TOPIC = 1000
+LOOKED = 50_000  # messages of a log whose numbers are looked at
+OF_TOPIC = 997  # of a topic; a prime keeps step with nothing that comes in turn
 HEAVY = ('Image', 'CompressedImage', 'PointCloud2', 'PointCloud', 'CameraInfo')  # not looked at
 LARGEST_ANGLE, LARGEST_RATE = 6.5, 20.0  # rad, rad/s: more is meant in degrees
 KINDS = {  # what a word says of the x, y and z, or 0, 1 and 2, behind it
@@ -78,6 +78,7 @@ class Looked:
     spans : path -> its numbers
     units : path -> unit that the file says
     count : messages that were looked at
+    share : of its messages that are looked at
 
     """
 
@@ -87,6 +88,7 @@ class Looked:
     spans: dict[str, Span] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     count: int = 0
+    share: float = 1.0
 
     def take(self, message: Any) -> None:
         """Widen the spans by a message."""
@@ -118,7 +120,7 @@ class Looked:
             words = [word for word in words_of(path) if word not in (*STAMP_UNITS, 'boot')]
             if words and words[0] in TIME_WORDS and span.filled > 1:
                 told = [*re.findall('[a-z]+', path.lower()), self.units.get(path, '')]
-                step = (span.high - span.low) / (span.filled - 1)
+                step = (span.high - span.low) / (span.filled - 1) * self.share
                 by_size = next(unit for least, unit in STEPS if step >= least)
                 return path, next(
                     (STAMP_UNITS[text] for text in told if text in STAMP_UNITS), by_size
@@ -139,12 +141,12 @@ class Looked:
 
 
 def looked_through(bag: Path, contents: BagContents) -> dict[str, Looked]:
-    """Topic -> what its messages hold; of tables all lines, else those at the beginning.
+    """Topic -> what its messages hold; of tables all lines, else some of each topic, evenly.
 
     Parameters
     ----------
     bag : folder or file
-    contents : its survey; `notes` gets what is odd
+    contents : its survey; `notes` gets what is odd, and topics that cannot be decoded
 
     """
     found = {topic: Looked(kind) for topic, kind in contents.types.items()}
@@ -156,19 +158,22 @@ def looked_through(bag: Path, contents: BagContents) -> dict[str, Looked]:
                 found[topic].spans = column_spans(table, contents.notes)
         return found
     left = {topic for topic, kind in contents.types.items() if not kind.endswith(HEAVY)}
+    most = min(OF_TOPIC, LOOKED // max(len(left), 1))
+    shares = {topic: min(most / max(contents.counts.get(topic, 0), 1), 1.0) for topic in left}
     while left:
+        found = {
+            topic: Looked(kind, share=shares.get(topic, 1.0))
+            for topic, kind in contents.types.items()
+        }
         try:
-            for i, (topic, _, message) in enumerate(messages(bag, left, [])):
-                if found[topic].count < OF_TOPIC:
-                    found[topic].take(message)
-                if i == LOOKED:
-                    break
+            for topic, _, message in messages(bag, left, [], shares):
+                found[topic].take(message)
             break
         except InputError as error:  # a topic without a definition of its type
             if error.key not in left:
                 break
             left.discard(error.key)
-            found = {topic: Looked(kind) for topic, kind in contents.types.items()}
+            contents.notes.append(f'fields not looked at: {error}')
     return found
 
 

@@ -19,13 +19,15 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.bag.mavlink_presets import preset
     from auv_analysis.bag.metadata import files_of
     from auv_analysis.bag.proposal import looked_through, proposal
+    from auv_analysis.output.progress import waiting
 
-    contents = survey(options.bag)
+    with waiting(f'reading {options.bag}'):
+        contents = survey(options.bag)
+        ours = PARAMETERS in contents.attachments  # whose recorder says of the topics what they are
+        known = preset(contents)
+        looked = {} if ours or known else looked_through(options.bag, contents)
     first, last = contents.first, contents.last
     span = None if first is None or last is None else (last - first) / 1e9
-    ours = PARAMETERS in contents.attachments  # whose recorder says of the topics what they are
-    known = preset(contents)
-    looked = {} if ours or known else looked_through(options.bag, contents)
     by_stamps = [one.duration for one in looked.values() if one.duration is not None]
     document = {
         'bag': str(options.bag),

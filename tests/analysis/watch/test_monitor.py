@@ -84,11 +84,13 @@ def test_computed_means_that_the_graph_does_not_publish_it() -> None:
 
 def test_refused_messages_are_one_line_that_fades() -> None:
     monitor = GraphMonitor(0)
+    monitor.complain(0.0, 'the first trouble')
     for i in range(3):
         text = f'{interface.WRENCH}: expected finite numbers, found (nan, {i})'
         monitor.refuse(float(i), interface.WRENCH, text)
         monitor.hear(float(i), interface.WRENCH, i, i * STEP, None)
-    (alert,) = monitor.snapshot(3.0).alerts
+    alert, older = monitor.snapshot(3.0).alerts
+    assert older.text == 'the first trouble', 'below what is newer'
     assert (alert.level, alert.count, alert.age) == ('error', 3, 1.0)
     assert alert.text.endswith('found (nan, 2)'), 'the newest of them'
     assert topic(monitor, 3.0, interface.WRENCH).refused == 3
@@ -103,26 +105,32 @@ def test_endpoints_that_do_not_fit_are_errors() -> None:
         interface.ODOM: ends(conflicts=(conflict,)),
         interface.WRENCH: ends(0, foreign='std_msgs/msg/String'),
         interface.CMD_VEL: ends(2),
+        interface.KINETIC_ENERGY: ends(2),
     }
     monitor.see(0.0, seen)
     found = texts(monitor, 0.1)
     assert found[0] == ('error', conflict)
     assert found[1][0] == 'error'
     assert 'found std_msgs/msg/String' in found[1][1]
-    assert found[2] == ('warning', f'{interface.CMD_VEL}: expected one publisher, found 2')
+    assert found[2:] == [
+        ('warning', f'{name}: expected one publisher, found 2')
+        for name in (interface.CMD_VEL, interface.KINETIC_ENERGY)
+    ]
     counts = {t.name: (t.publishers, t.subscribers) for t in monitor.snapshot(0.1).topics}
-    assert [counts[name] for name in seen] == [(1, 2), (0, 2), (2, 2)]
+    assert [counts[name] for name in seen] == [(1, 2), (0, 2), (2, 2), (2, 2)]
 
 
 def test_what_is_published_and_does_not_come_is_said() -> None:
     monitor = GraphMonitor(0)
-    monitor.see(0.0, {interface.ODOM: ends(), interface.WRENCH: ends(), interface.PROGRESS: ends()})
-    monitor.hear(0.0, interface.ODOM, 0, 0, STATE)
+    for now in (0.0, 1.0, 2.0):
+        monitor.see(
+            now, dict.fromkeys((interface.ODOM, interface.WRENCH, interface.PROGRESS), ends())
+        )
+    monitor.hear(0.5, interface.ODOM, 0, 0, STATE)
     assert texts(monitor, SILENT) == []
-    (level, text), *rest = texts(monitor, SILENT + 0.1)
-    assert level == 'warning'
-    assert text.endswith(f': {interface.ODOM}, {interface.WRENCH}')
-    assert rest == []
+    (alert,) = monitor.snapshot(SILENT + 1.0).alerts
+    assert (alert.level, alert.age) == ('warning', SILENT + 0.5), 'since all of them are silent'
+    assert alert.text.endswith(f': {interface.ODOM}, {interface.WRENCH}')
     monitor.see(4.0, {interface.ODOM: ends(0), interface.WRENCH: ends(0)})
     assert texts(monitor, 5.0) == [], 'a run that has ended is no alert'
 
@@ -131,7 +139,9 @@ def test_nodes_that_complain_and_nodes_that_fall_silent() -> None:
     monitor = GraphMonitor(0)
     monitor.diagnose(0.0, NodeState('/plant_node', 'ok', 'ok', 0.0, {'step': '7'}))
     monitor.diagnose(0.0, NodeState('/controller_node', 'error', 'refused: odom', 0.0))
-    assert texts(monitor, 1.0) == [('error', '/controller_node: refused: odom')]
+    (alert,) = monitor.snapshot(1.0).alerts
+    assert (alert.level, alert.text) == ('error', '/controller_node: refused: odom')
+    assert alert.age == 1.0
     names = [(node.name, node.level) for node in monitor.snapshot(1.0).nodes]
     assert names == [('/controller_node', 'error'), ('/plant_node', 'ok')]
     monitor.diagnose(2.0, NodeState('/controller_node', 'ok', 'ok', 0.0))
@@ -155,7 +165,8 @@ def test_set_points_of_another_clock_are_a_warning() -> None:
     monitor = GraphMonitor(0)
     for k in range(50):
         monitor.hear(k / 100, interface.CMD_VEL, k, 10**18 + k * STEP, (0.1,) * 6)
-        monitor.hear(k / 100, interface.ODOM, k, k * STEP, STATE)
+    assert texts(monitor, 0.5) == [], 'odometry may yet come'
+    monitor.hear(0.5, interface.ODOM, 0, 0, STATE)
     assert texts(monitor, 0.5) == [
         ('warning', f'{interface.CMD_VEL}: expected a set-point of the last second, found none')
     ]

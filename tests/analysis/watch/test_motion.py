@@ -74,10 +74,12 @@ def test_a_velocity_without_its_set_point_does_not_replace_a_pair_at_once() -> N
 
 def test_the_true_state_comes_before_the_measured_one() -> None:
     motion = LiveMotion()
+    motion.hear(0.0, interface.CMD_VEL, 0, NU_D)
     motion.hear(0.0, interface.ODOM, 0, state((9.0,) * 6))
     motion.hear(0.0, interface.GROUND_TRUTH, 0, state(NU))
     motion.hear(0.0, interface.ODOM, STEP, state((9.0,) * 6))
     assert (motion.source, motion.nu) == (interface.GROUND_TRUTH, NU)
+    assert_allclose(motion.errors.largest, np.abs(np.subtract(NU_D, NU)))
 
 
 @QUICK

@@ -2,6 +2,7 @@
 
 import io
 import math
+import sys
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import Any
@@ -79,7 +80,10 @@ def row(found: list[str], name: str) -> list[str]:
 
 
 @pytest.mark.parametrize('size', [(80, 24), (120, 40), (200, 60), (80, 12), (60, 10)])
-@pytest.mark.parametrize('snapshot', [Snapshot(0), FULL, replace(FULL, alerts=WRONG)])
+@pytest.mark.parametrize(
+    'snapshot',
+    [Snapshot(0), FULL, replace(FULL, alerts=WRONG), replace(FULL, nodes=FULL.nodes * 15)],
+)
 def test_a_terminal_is_never_too_small(snapshot: Snapshot, size: tuple[int, int]) -> None:
     found = lines(snapshot, *size)
     assert max(map(len, found)) <= size[0]
@@ -148,6 +152,7 @@ def test_topics_and_nodes_are_listed_with_their_health() -> None:
     assert row(found, interface.ODOM)[1:5] == ['100', '0.2', 's', '0']
     assert any(line.split()[-2:] == ['node', 'health'] for line in found)
     assert row(found, interface.PROGRESS)[-2:] == ['–', '–']
+    assert any(line.startswith(f'and {len(FULL.topics)} more') for line in lines(FULL, 80, 12))
     assert 'auv1/controller_node  error refused 3' in text
     assert 'auv1/plant_node       ok step 1234' in text
     assert 'stale for 7.0 s not ready' in text
@@ -173,11 +178,31 @@ def test_troubles_are_lines_of_their_own_and_end_where_the_terminal_does() -> No
     assert 'zzz' in ' '.join(lines(replace(FULL, alerts=(long,)), 80, 24)), 'none is cut off'
 
 
-def test_errors_are_red_on_a_terminal() -> None:
-    console = Console(file=io.StringIO(), width=80, force_terminal=True, color_system='standard')
-    console.print(screen(replace(FULL, alerts=WRONG[:1]), 80, 24))
-    line = next(x for x in console.file.getvalue().splitlines() if 'trouble 1' in x)
-    assert line.startswith('\x1b[1;31m')
+def test_what_is_wrong_is_yellow_or_red_on_a_terminal() -> None:
+    first, *others = FULL.topics
+    topics = (replace(first, refused=1, gaps=77), *others)
+    alerts = (*WRONG[:1], Alert('warning', 'doubt'))
+    console = Console(file=io.StringIO(), width=120, force_terminal=True, color_system='standard')
+    console.print(screen(replace(FULL, topics=topics, alerts=alerts), 120))
+    text = console.file.getvalue()
+    yellow, red, bold_red = '\x1b[33m', '\x1b[31m', '\x1b[1;31m'
+    for words in (
+        f'{yellow}warning: doubt',
+        f'{yellow}  77',
+        f'{yellow}stale',
+        f'{yellow} not ready',
+    ):
+        assert words in text
+    for words in (f'{bold_red}error, 1.0 s ago: trouble 1', f'{bold_red}{first.name}',
+                  f'{bold_red}error\x1b[0m{red} refused 3'):  # fmt: skip
+        assert words in text
+
+
+def test_bars_and_dashes_are_marks_where_the_encoding_has_none(monkeypatch) -> None:
+    out = io.TextIOWrapper(io.BytesIO(), encoding='latin-1')
+    monkeypatch.setattr(sys, 'stdout', out)
+    Display(stderr=False, single=True).end(FULL)
+    assert 'surge' in out.buffer.getvalue().decode('latin-1')
 
 
 def test_texts_of_numbers() -> None:
@@ -202,6 +227,7 @@ class Graph:
 
     begins: float = math.inf
     published: bool = False
+    conflicts: tuple[str, ...] = ()
     others: list[str] = field(default_factory=list)
     now: float = 0.0
     ended: bool = False
@@ -211,7 +237,8 @@ class Graph:
         return self.now
 
     def listen(self) -> None:
-        ends = SimpleNamespace(publishers=self.published, subscribers=0, conflicts=(), foreign='')
+        there = {'publishers': self.published, 'conflicts': self.conflicts}
+        ends = SimpleNamespace(subscribers=0, foreign='', **there)
         self.monitor.see(self.now, dict.fromkeys(HEARD, ends))
         if self.now >= self.begins:
             self.monitor.hear(self.now, interface.ODOM, None, round(self.now * 1e9), None)
@@ -265,3 +292,14 @@ def test_in_a_pipe_every_look_that_shows_something_is_printed(
 def test_what_was_waited_for_in_vain_is_said(monkeypatch, there: dict, words: str) -> None:
     with pytest.raises(FailedError, match=words):
         run(Graph(**there), monkeypatch, limit=2.0, single=True)
+
+
+def test_what_is_wrong_is_shown_while_it_waits(monkeypatch) -> None:
+    graph, shown = Graph(conflicts=('incompatible QoS',)), []
+    monkeypatch.setattr(module, 'time', graph)
+    display = SimpleNamespace(live=True, show=shown.append)
+    with pytest.raises(FailedError):
+        Session(graph.monitor, graph, display, None).run(graph, 9.9, once=False)
+    first, second, *_ = shown[-1].alerts
+    assert first.text.endswith('; waiting')
+    assert second.text == 'incompatible QoS'

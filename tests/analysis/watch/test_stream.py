@@ -102,12 +102,13 @@ def test_without_numbers_messages_are_counted_and_stamps_not_judged() -> None:
 
 def test_another_run_begins_anew() -> None:
     stream = Stream()
-    hear(stream, range(100), number=lambda i: i + 1)
-    assert not stream.hear(1.0, 101, 100 * STEP)
+    hear(stream, [*range(50), *range(51, 101)], number=lambda i: i + 1)
+    assert not stream.hear(1.0, 101, 101 * STEP)
+    assert stream.gaps == 1
     assert stream.hear(2.0, 1, 0), 'a publisher with early numbers and stamps'
-    now = hear(stream, range(1, 100), begin=2.0 + PERIOD)
-    assert (stream.gaps, stream.repeats) == (0, 0)
-    assert stream.pace(now) == pytest.approx(1.0), 'of the new run alone'
+    now = hear(stream, range(3, 300, 3), number=lambda i: i + 2, begin=2.0 + PERIOD)
+    assert (stream.gaps, stream.repeats) == (0, 0), 'of the new run and its longer step alone'
+    assert stream.pace(now) == pytest.approx(3.0)
 
 
 def test_another_run_of_which_the_beginning_was_not_heard() -> None:

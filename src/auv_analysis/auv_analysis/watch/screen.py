@@ -139,7 +139,7 @@ def motion_table(snapshot: Snapshot, width: int) -> Table:
     table.add_column('', width=BAR, no_wrap=True)
     if wide:
         table.add_column('error, last 10 s', width=HISTORY, no_wrap=True)
-    energy, history = snapshot.kinetic_energy, errors.history[-HISTORY:]
+    energy, history = snapshot.kinetic_energy, errors.history
     for i, dof in enumerate(DOFS):
         share = energy.shares_percent[i] if energy else None
         row: list[RenderableType] = [dof, *(texts[i] for _, texts in columns.values())]

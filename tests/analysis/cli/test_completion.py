@@ -35,17 +35,23 @@ def _offered(line: str, folder: Path) -> list[str]:
     [
         ('auv simul', {'simulate'}),
         ('auv run case1_b', {'case1_bluerov2', 'case1_bluerov2_heavy'}),
-        ('auv simulate mi', {'mine.yaml'}),
+        ('auv simulate mi', {'mine.yaml', 'mine.yml'}),
+        ('auv analyze mi', {'mine.mcap', 'mine.yaml', 'mine.yml'}),
+        ('auv atlas herman', {'herman2018', 'herman2018_neutral'}),
+        ('auv linearize case1_b', {'case1_bluerov2', 'case1_bluerov2_heavy'}),
         ('auv check-vehicle herman', {'herman2018', 'herman2018_neutral'}),
         ('auv sweep case1', {'case1_gains'}),
         ('auv run case1 --controller ', {'gvc', 'cl'}),
         ('auv simulate mine.yaml --controller f', {'first'}),
+        ('auv tune case1 --reference ', {'gvc', 'cl'}),
         ('auv tune case1 --law s', {'smc'}),
         ('auv design rexrov --red', {'--reduce'}),
     ],
 )
 def test_names_are_offered(line: str, offered: set[str], tmp_path: Path) -> None:
     (tmp_path / 'mine.yaml').write_text(SCENARIO)
+    for ending in ('yml', 'mcap'):
+        (tmp_path / f'mine.{ending}').touch()
     assert set(_offered(line, tmp_path)) == offered
 
 

@@ -7,10 +7,12 @@ import mmap
 import os
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 from collections import namedtuple
 from contextlib import nullcontext
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -126,19 +128,29 @@ def test_packages_that_are_missing_old_or_broken_are_named(tmp_path, monkeypatch
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))
     monkeypatch.setattr(checks, 'OURS', ('fake_auv',))
-    found = [finding.found for finding in checks.packages()]
-    assert found == [
+    findings = list(checks.packages())
+    assert [finding.found for finding in findings] == [
         'missing: not-there>=2',
         'wrong version: fake_old 2.0, not fake_old>=3',
         'fake_bad does not load: RuntimeError: built for another',
     ]
+    assert all(finding.advice.startswith(checks.AGAIN) for finding in findings)
 
 
-def test_a_package_that_ends_the_process_is_named(tmp_path, monkeypatch):
-    (tmp_path / 'fake_crash.py').write_text('import os\nos._exit(7)\n')
+def test_a_sound_installation_is_called_one(monkeypatch):
+    def absent(modules: list[str]) -> dict[str, str]:
+        return {name: 'absent' for name in modules if find_spec(name) is None}
+
+    monkeypatch.setattr(checks, '_failing', absent)  # to load them all takes long
+    assert [finding.verdict for finding in checks.packages()] == ['ok']
+
+
+@pytest.mark.parametrize('code', [0, 7])
+def test_a_package_that_ends_the_process_is_named(code, tmp_path, monkeypatch):
+    (tmp_path / 'fake_crash.py').write_text(f'import os\nos._exit({code})\n')
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))
     failing = checks._failing(['json', 'fake_crash', 'csv'])
-    assert failing == {'fake_crash': 'it ends the process with exit code 7'}
+    assert failing == {'fake_crash': f'it ends the process with exit code {code}'}
 
 
 def test_absent_compiler_is_a_warning(monkeypatch):
@@ -167,7 +179,7 @@ def test_another_auv_in_front_is_a_warning(tmp_path, monkeypatch):
     assert {finding.verdict for finding in checks.executables()} == {'ok'}
 
 
-@pytest.mark.parametrize(('free', 'verdict'), [(1 << 20, 'broken'), (1 << 30, 'warning')])
+@pytest.mark.parametrize(('free', 'verdict'), [(100 << 20, 'broken'), (1 << 30, 'warning')])
 def test_full_disk_is_said(free, verdict, monkeypatch):
     monkeypatch.setattr(shutil, 'disk_usage', lambda _: Usage(1 << 40, 0, free))
     _one(checks.disk, verdict, 'make room')
@@ -176,6 +188,7 @@ def test_full_disk_is_said(free, verdict, monkeypatch):
 def test_left_over_segments_are_counted_and_those_in_use_are_not(tmp_path, monkeypatch):
     for i in range(60):
         (tmp_path / f'fastrtps_{i}').write_bytes(b'x')
+    (tmp_path / 'sem.fastdds_0').touch()
     (tmp_path / 'somebody_else').touch()
     system, size = ctypes.CDLL(None), ctypes.c_size_t(1)
     system.mmap.restype = ctypes.c_void_p
@@ -185,9 +198,11 @@ def test_left_over_segments_are_counted_and_those_in_use_are_not(tmp_path, monke
     with (tmp_path / 'fastrtps_0').open():
         left = checks.left_over(tmp_path)
     system.munmap(mapped, size)
-    assert len(left) == 58
+    assert len(left) == 59
     assert not {tmp_path / 'fastrtps_0', tmp_path / 'fastrtps_1'} & set(left)
-    _one(lambda: checks.shared_memory(tmp_path), 'warning', '60 files', 'rm ')
+    found = _one(lambda: checks.shared_memory(tmp_path), 'warning', '61 files')
+    patterns = found.advice.partition('rm ')[2].split()
+    assert all(any(path.match(pattern) for pattern in patterns) for path in left)
     monkeypatch.setattr(os, 'getuid', lambda: -1)  # nobody may remove those of others
     assert checks.left_over(tmp_path) == []
 
@@ -228,8 +243,9 @@ def test_single_core_and_absent_programs_are_said(monkeypatch):
     _one(checks.cores, 'warning', '--composed')
     monkeypatch.setattr(shutil, 'which', lambda _: None)
     assert [finding.check for finding in checks.programs()] == ['chromium', 'ros2']
-    monkeypatch.setattr(shutil, 'which', lambda name: name == checks.BROWSERS[0] or None)
-    assert [finding.check for finding in checks.programs()] == ['ros2']
+    for browser in ('chromium', 'google-chrome'):
+        monkeypatch.setattr(shutil, 'which', {browser: '/usr/bin/browser'}.get)
+        assert [finding.check for finding in checks.programs()] == ['ros2']
 
 
 def test_participants_that_cannot_start_are_broken(tmp_path, monkeypatch):
@@ -237,6 +253,17 @@ def test_participants_that_cannot_start_are_broken(tmp_path, monkeypatch):
     (tmp_path / 'rclpy' / '__init__.py').write_text('raise ImportError("no such library")\n')
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))
     _one(discovery.discovery, 'broken', 'cannot start: ImportError: no such library')
+
+
+def test_a_participant_that_hangs_is_ended_and_named(monkeypatch):
+    monkeypatch.setattr(discovery, 'STARTS', 0.0)
+    monkeypatch.setattr(discovery, 'PATIENCE', 0.1)
+    process = subprocess.Popen(['sleep', '600'], stdout=-1, stderr=-1, text=True)
+    try:
+        assert 'did not end within' in discovery._answer(process)['why']
+        assert process.returncode == -signal.SIGKILL
+    finally:
+        process.kill()
 
 
 @pytest.mark.parametrize(
@@ -294,6 +321,7 @@ def test_exit_code_and_document(verdict, code, monkeypatch, capsys):
         out = capsys.readouterr().out
         if not options:
             assert f'{verdict:<8}  x: y' in out
+            assert ('nothing is broken' in out) == (not code)
     document = json.loads(out)
     assert document['findings'] == [{'check': 'x', 'verdict': verdict, 'found': 'y', 'advice': 'z'}]
     assert (document['broken'], document['warnings']) == (code, int(verdict == 'warning'))

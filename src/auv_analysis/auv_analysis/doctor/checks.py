@@ -22,7 +22,7 @@ from typing import Literal, NamedTuple
 OLDEST, NEWEST = (3, 11), (3, 13)
 OURS = ('auv_dynamics', 'auv_gvc_controller', 'auv_analysis')
 MODULES = {  # of distributions that are imported under another name
-    'pyyaml': 'yaml', 'pillow': 'PIL', 'jinja2': 'jinja2', 'salib': 'SALib',
+    'pyyaml': 'yaml', 'pillow': 'PIL', 'salib': 'SALib',
     'mcap-ros2-support': 'mcap_ros2',
 }  # fmt: skip
 PATIENCE = 120.0  # s for all packages to be imported, from a cold disk
@@ -50,7 +50,7 @@ LEAST_SHARED, LITTLE_SHARED = 8 * MEGA, 64 * MEGA
 LEAST_FILES, FEW_FILES = 128, 1024
 MANY_SEGMENTS = 50  # left over; each takes about half a megabyte
 SHARED = Path('/dev/shm')
-OF_FAST_DDS = ('fastrtps_', 'fastdds_', 'sem.fastrtps_', 'sem.fastdds_')
+OF_FAST_DDS = ('fastrtps_', 'fastdds_')  # and sem. before them
 BROWSERS = ('chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable')
 Verdict = Literal['ok', 'note', 'warning', 'broken']
 
@@ -299,13 +299,15 @@ def shared_memory(folder: Path = SHARED) -> Iterator[Finding]:
         size = sum(path.stat().st_size for path in left if path.exists())
         found = f'{len(left)} files of ended Fast DDS processes in {folder}, {size / MEGA:.0f} MB'
         many = len(left) > MANY_SEGMENTS or free <= LITTLE_SHARED
-        advice = f'while no node runs: rm {folder}/*fastrtps_* {folder}/*fastdds_*'
+        patterns = ' '.join(f'{folder}/*{name}*' for name in OF_FAST_DDS)
+        advice = f'while no node runs: rm {patterns}'
         yield Finding('shared memory', 'warning' if many else 'note', found, advice)
 
 
 def left_over(folder: Path) -> list[Path]:
     """Files of Fast DDS, of this user, that no process uses."""
-    ours = [path for path in folder.iterdir() if path.name.startswith(OF_FAST_DDS)]
+    names = [(path, path.name.removeprefix('sem.')) for path in folder.iterdir()]
+    ours = [path for path, name in names if name.startswith(OF_FAST_DDS)]
     used = _in_use(folder)
     own = os.getuid()
     return [path for path in ours if str(path) not in used and path.stat().st_uid == own]

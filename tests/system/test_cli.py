@@ -477,6 +477,15 @@ def test_interrupt_that_python_drops_ends_the_command(monkeypatch, capsys) -> No
     assert capsys.readouterr().err == 'interrupted\n'
 
 
+def test_a_reader_that_has_gone_is_no_error_to_be_read(monkeypatch, capsys) -> None:
+    read, write = os.pipe()
+    os.close(read)
+    with os.fdopen(write, 'w') as broken:  # closed, as at the end, it writes what is left
+        monkeypatch.setattr(sys, 'stdout', broken)
+        assert _exit_code('params', 'case1', '--controller', 'gvc') == 1
+    assert capsys.readouterr().err == ''
+
+
 @pytest.mark.parametrize('error', [OSError(28, 'No space left on device', 'x/y'), OSError('odd')])
 def test_full_disk_ends_in_one_line(error, monkeypatch, capsys) -> None:
     def command(_: object) -> dict:

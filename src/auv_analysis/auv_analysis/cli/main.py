@@ -171,7 +171,8 @@ def _work(command: Callable[..., dict[str, Any]], options: Any) -> None:
 
 def _print(options: Any, document: dict[str, Any]) -> None:
     if options.json:
-        print(json.dumps(document, allow_nan=False), flush=True)
+        print(json.dumps(document, allow_nan=False))
+    print(end='', flush=True)  # whoever reads may have gone: not first known when Python ends
 
 
 def _say(text: str) -> None:

@@ -31,8 +31,6 @@ LAST_WORDS = 1.5  # s for letting go at the end, at most
 class Driver(BulkNode):
     """Wiring: MAVLink on one side, odometry and wrench on the other."""
 
-    prompt = True
-
     def __init__(self) -> None:
         super().__init__('bluerov2_driver')
         self.graph = NodeInterface(self)

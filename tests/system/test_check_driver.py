@@ -168,9 +168,11 @@ def test_a_healthy_vehicle_passes(runs: Runs) -> None:
     passed = ended.passed
     assert passed > {'response_sway', 'response_delay', 'silence', 'actuation'}
     assert passed > {'clock', 'age', 'drift', 'twist_frame', 'wrench_publishers', 'qos_recorder'}
-    before = ended.errors.partition('begins in')[0]
+    before, begins, after = ended.errors.partition('begins in 3 s')
     assert 'THE VEHICLE WILL MOVE' in before
     assert 'sway ±' in before
+    assert begins
+    assert 'sway ...' in after
 
 
 def test_a_reversed_axis_fails(runs: Runs) -> None:

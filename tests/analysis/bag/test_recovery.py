@@ -5,6 +5,7 @@ import os
 import tempfile
 from collections import Counter
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -211,6 +212,7 @@ def test_all_of_a_record_is_kept(tmp_path: Path) -> None:
     recover(put(tmp_path / 'cut', whole[: len(whole) // 2]).parent)
     with (tmp_path / 'cut' / 'bag_0.mcap').open('rb') as file:
         reader = make_reader(file)
+        assert reader.get_header() == make_reader(BytesIO(whole)).get_header()
         rows = [(m.log_time, m.publish_time, m.sequence) for *_, m in reader.iter_messages()]
         assert rows == [(k, k + 5, 100 + k) for k in range(len(rows))]
         assert len(rows) > 5

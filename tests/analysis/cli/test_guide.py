@@ -66,6 +66,12 @@ def test_files_at_hand_are_proposed_by_what_they_are(text, line, folder, capsys)
     assert line in _said(capsys)
 
 
+def test_of_many_files_a_few_are_proposed(folder, capsys):
+    for number in range(5):
+        (folder / f'{number}.yaml').write_text('controllers: {}\n')
+    assert _said(capsys).count('auv simulate') == 3
+
+
 def test_help_lists_every_command_once_below_a_heading(capsys):
     with pytest.raises(SystemExit) as end:
         main.main(['--help'])

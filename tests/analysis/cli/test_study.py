@@ -1,14 +1,17 @@
 """`auv study`: what it refuses before it works."""
 
+from argparse import Namespace
 from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
 
-from auv_analysis.cli import main
+from auv_analysis.cli import main, study
 from auv_analysis.graph import domain, recorded_runs
 from auv_analysis.simulation import simulate
+from auv_analysis.studies.study import sensitivity
 from auv_dynamics.files.errors import FailedError
 
 GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
@@ -45,3 +48,12 @@ def test_a_study_on_the_nodes_is_one(tmp_path: Path, monkeypatch, capsys) -> Non
         main.main(['study', 'case1', *options])
     assert (end.value.code, 'enough' in capsys.readouterr().err) == (1, True)
     assert asked == ['zoh', ((7, False), True)]
+
+
+def test_why_there_is_no_sensitivity_is_said(monkeypatch, capsys) -> None:
+    refused = SimpleNamespace(refusal='the law has no gains')
+    monkeypatch.setattr(sensitivity, 'sensitivity', lambda *_, **__: refused)
+    options = Namespace(sensitivity=None, samples=None, span=2.0, seed=0, hold='zoh')
+    study._sensitivities(options, SimpleNamespace(name='s'), {'mine': None})
+    said = 'note: mine: no sensitivity to the gains: the law has no gains'
+    assert said in capsys.readouterr().err.splitlines()

@@ -1,6 +1,8 @@
 """Summaries in a terminal of 80 columns: every figure in its place, and what is not known."""
 
 import io
+from argparse import Namespace
+from types import SimpleNamespace
 from typing import Any
 
 from helpers.strategies import QUICK
@@ -8,8 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
+from auv_analysis.cli import analyze
 from auv_analysis.cli.scenario_runs import summary_tables
 from auv_analysis.output.text import number
+from auv_analysis.studies.compare import report as comparing
 from auv_dynamics.vehicle import DOFS
 
 COLUMNS = [
@@ -127,6 +131,17 @@ def test_several_runs_are_compared_by_their_worst() -> None:
     assert lines[0] == ['one', '402.45', settled, '0.500', 'm/s', 'heave']
     assert lines[1] == ['two', '402.45', settled, '0.500', 'rad/s', 'roll']
     assert 'energy, J' not in text_of({'one': runs['one']})
+
+
+def test_of_many_runs_the_comparison_alone_is_shown(tmp_path, monkeypatch, capsys) -> None:
+    summaries = {'one': summary(), 'diverged': None, 'two': summary()}
+    read, concluded = [SimpleNamespace(scenario='s')], lambda *_, **__: summaries
+    monkeypatch.setattr(comparing, 'entries_of', lambda *_: read)
+    monkeypatch.setattr(comparing, 'conclude_comparison', concluded)
+    given = {'vehicle': None, 'out': tmp_path / 'out', 'overwrite': False, 'map': None}
+    assert analyze._many([], Namespace(**given, no_report=True)) == summaries
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.split()[:2] for line in lines[-2:]] == [['one', '402.45'], ['two', '402.45']]
 
 
 def test_notes_and_names_are_shown_as_they_are() -> None:

@@ -58,7 +58,9 @@ def test_damping_acts_in_gazebo_as_here(tmp_path, capsys):
 
 def test_document_says_what_gazebo_cannot_hold(capsys):
     main(['export-vehicle', 'rexrov', '--json'])
-    document = json.loads(capsys.readouterr().out)
+    captured = capsys.readouterr()
+    document = json.loads(captured.out)
+    assert captured.err.splitlines() == document['notes']
     said = ' '.join(document['notes'])
     assert 'Unstable' in said
     assert 'off the diagonal' in said

@@ -23,7 +23,12 @@ def imported(tmp_path, monkeypatch, capsys):
     def run(name, text, *options):
         (tmp_path / name).write_text(text, encoding='utf-8')
         main(['import-vehicle', name, *options, '--out', 'made.yaml', '--overwrite', '--json'])
-        document = json.loads(capsys.readouterr().out)
+        captured = capsys.readouterr()
+        document = json.loads(captured.out)
+        titles = ('traps', 'handled'), ('assumed',) * 2, ('left_out', 'left out')
+        titles = *titles, ('warnings', 'warning')
+        report = [f'{title}: {text}' for key, title in titles for text in document[key]]
+        assert captured.err == ''.join(f'{line}\n' for line in report)
         return load_vehicle(tmp_path / 'made.yaml'), document
 
     return run
@@ -40,6 +45,7 @@ def assert_same(vehicle, other, rounding=1e-12):
 def test_rexrov_of_uuv_simulator_is_the_shipped_one(imported, file):
     vehicle, document = imported(file, REXROV if file.endswith('yaml') else URDF)
     assert document['format'] == 'uuv'
+    assert document['vehicle']['source'] == f'imported from uuv_simulator, {file}'
     assert_same(vehicle, load_vehicle('rexrov'))
     traps = ' '.join(document['traps'])
     assert 'rigid_body.inertia: from forward-left-up to FSD, 4 entries turn sign' in traps
@@ -49,6 +55,7 @@ def test_rexrov_of_uuv_simulator_is_the_shipped_one(imported, file):
 def test_bluerov2_of_a_list_is_the_shipped_one(imported):
     vehicle, document = imported('list.m', BLUEROV2, *LIST)
     assert document['format'] == 'mss'
+    assert document['vehicle']['source'] == 'imported from a list of derivatives, list.m'
     assert_same(vehicle, load_vehicle('bluerov2'), DIGITS)
     assert any('Xuu' in text for text in document['assumed'])
 
@@ -56,6 +63,7 @@ def test_bluerov2_of_a_list_is_the_shipped_one(imported):
 def test_link_of_gazebo_is_turned_to_forward_starboard_down(imported):
     vehicle, document = imported('made.sdf', sdf())
     assert document['format'] == 'gazebo'
+    assert document['vehicle']['source'] == 'imported from Gazebo, made.sdf'
     assert_allclose(vehicle.r_G, [0.01, -0.02, 0.03])
     assert_allclose(vehicle.r_B, [0, 0, -0.05])
     assert vehicle.buoyancy == pytest.approx(98.1)

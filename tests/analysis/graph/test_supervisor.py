@@ -6,6 +6,7 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import psutil
 import pytest
@@ -15,7 +16,7 @@ from auv_analysis.graph import supervisor
 
 
 def test_who_ends_is_named_with_its_last_words_and_what_the_others_complain_of(
-    tmp_path: Path,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     group = supervisor.Supervisor(tmp_path, os.environ)
     said = '; '.join(f'echo "[ERROR] [1.0] [other]: {word}"' for word in ('first', 'second'))
@@ -30,6 +31,8 @@ def test_who_ends_is_named_with_its_last_words_and_what_the_others_complain_of(
             group.check(may_end='node')
         assert group.complaints('other', 'other') == ['first', 'second']
         assert group.complaints('other', 'another') == []
+        monkeypatch.setattr(os, 'statvfs', lambda _: SimpleNamespace(f_bavail=0))
+        assert group.last_lines('node').endswith(f'{tmp_path}: no space left on the file system')
     finally:
         codes = group.stop()
     assert codes == {'other': -signal.SIGTERM, 'quiet': -signal.SIGTERM, 'node': 3}

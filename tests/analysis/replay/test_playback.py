@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from auv_analysis.cli.replay import DOWN, RIGHT, UP, _obey, _state
+from auv_analysis.cli.replay import DOWN, RIGHT, UP, _obey, _play, _state
 from auv_analysis.nodes.replay_node import HELD, Playback
 
 SECOND = 10**9
@@ -136,3 +136,19 @@ def test_keys_pause_go_on_and_step_and_the_bar_says_so() -> None:
     assert said == ['pause', 'run', 'step', 'step']
     assert _state(player, '') == 'paused, x 2, loop 2'
     assert _state(player, 'somebody') == 'waiting, x 2, loop 2'
+
+
+def test_what_a_replay_waits_for_is_said_once(capsys) -> None:
+    missing = 'odom: expected 1 subscribers, found 0'
+    playback = SimpleNamespace(rate=1.0, paused=False)
+    player = SimpleNamespace(now_ns=0, playback=playback, loops=0, waits_for=lambda: missing)
+    plan = SimpleNamespace(begin=0, end=10)
+    node = SimpleNamespace(player=player, plan=plan, playing=False, exit_code=None)
+    looks = iter((None, None, 0))
+
+    def spin(_: float) -> None:
+        node.exit_code = next(looks)
+
+    keyboard = SimpleNamespace(there=False, ended=False, wait=lambda _: b'')
+    _play(SimpleNamespace(node=node, spin=spin), keyboard)
+    assert capsys.readouterr().err.count(f'waits: {missing}\n') == 1

@@ -14,6 +14,7 @@ from helpers.patience import patience
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate
+from auv_analysis.studies.compare.sources import open_source, sources_of
 from auv_dynamics import InputError
 from auv_dynamics.kernel.compile import cache_folder
 
@@ -125,7 +126,7 @@ def test_a_wrong_law_is_refused_in_one_line_before_it_runs(line, tmp_path, monke
     assert '\n' not in str(caught.value)
 
 
-def test_a_law_that_fails_under_way_is_named(tmp_path, monkeypatch):
+def test_a_law_that_fails_under_way_is_named(tmp_path, monkeypatch, capsys):
     (tmp_path / 'late_law.py').write_text(
         'from typing import NamedTuple\nimport numpy as np\n\n\n'
         'class Late(NamedTuple):\n    k_P: np.ndarray\n    STATES = 6\n'
@@ -140,3 +141,7 @@ def test_a_law_that_fails_under_way_is_named(tmp_path, monkeypatch):
     )
     with pytest.raises(ArithmeticError, match='the law Late failed: KeyError'):
         simulate(load_scenario(path), 'mine', 'zoh')
+    (source,) = sources_of([str(path)])
+    with pytest.raises(ArithmeticError, match='the law Late failed: KeyError'):
+        open_source(source, None)
+    assert 'runs as plain Python' in capsys.readouterr().err, 'which takes long'

@@ -137,6 +137,7 @@ def test_a_recording_that_contradicts_the_prior_gives_no_file(bag, tmp_path, cap
     said = capsys.readouterr()
     assert end.value.code == 1
     assert 'another vehicle' in said.err
+    assert '  least squares\n' in said.err, 'how far it is'
     assert json.loads(said.out) == json.loads((out / 'identify.json').read_text())
     assert not (out / 'vehicle.yaml').exists()
     code, said = auv(capsys, *given, '--accept', '--overwrite')

@@ -51,7 +51,10 @@ def test_overwrite_replaces_a_sweep_and_leaves_the_rest(command: Callable, files
     (files / 'campaign.yaml').write_text(text)
     assert command()[0] == 2
     assert parts(files / 'runs/small') == first
-    assert command('--overwrite')[0] == 0
+    code, _, lines = command('--overwrite')
+    assert code == 0
+    table = ['controller ok diverged refused', 'gvc 4 0 0', 'cl 4 0 0']
+    assert [line.split() for line in lines[-4:-1]] == [line.split() for line in table]
     assert len(parts(files / 'runs/small')) == 1
     assert rows(files / 'runs/small')['index'].to_pylist() == [*range(4)] * 2
     assert (files / 'runs/small/notes.md').read_text() == 'mine'

@@ -55,6 +55,9 @@ def test_folder_document_and_files_agree(command: Callable, tmp_path: Path, appr
     assert json.loads((folder / 'tune.json').read_text()) == document
     assert list(document['controllers']) == ['gvc', 'cl', 'gvc_tuned', 'cl_tuned']
     assert lines[-1].endswith('runs/tune_small/report.html')
+    assert set(document['controllers']) <= {
+        line.partition(' ')[0] for line in map(str.strip, lines)
+    }
     _equal(document, 'effort', 1e-3)
     _repeated(document, folder)
     _searched(document, folder)

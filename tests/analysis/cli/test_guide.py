@@ -56,7 +56,7 @@ def test_results_are_proposed_to_be_looked_at_the_newest_first(folder, capsys):
     [
         ('controllers: {}\n', 'auv simulate mine.yaml'),
         ('name: x\nrigid_body: {}\n', 'auv check-vehicle mine.yaml'),
-        ('vary: []\n', 'auv sweep mine.yaml'),
+        ('controllers: [gvc]\nvary: []\n', 'auv sweep mine.yaml'),
         ('colour: red\n', 'auv simulate case1'),
         ('\x00\ufffe', 'auv simulate case1'),
     ],

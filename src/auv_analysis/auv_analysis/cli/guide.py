@@ -12,10 +12,10 @@ RUNS = 'runs'
 LOOKED_AT = 200  # files and folders: an answer must not take long
 LONGEST = 1 << 16  # bytes of a YAML file that are looked at
 SHOWN = 3
-KINDS = {  # what only a file of its kind has at its beginning of a line
+KINDS = {  # what only a file of its kind has at its beginning of a line, or none of those below
+    'campaign': re.compile(rb'^vary:', re.M),
     'scenario': re.compile(rb'^controllers:', re.M),
     'vehicle': re.compile(rb'^rigid_body:', re.M),
-    'campaign': re.compile(rb'^vary:', re.M),
 }
 
 

@@ -4,7 +4,6 @@ import argparse
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
-from glob import escape
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +65,7 @@ def scenario_folder(
     return results_folder(
         options.out or Path('runs') / scenario.name,
         overwrite=options.overwrite,
-        own=[f'{escape(name)}{ending}' for name in names for ending in own],
+        own=[f'{name}{ending}' for name in names for ending in own],
         inputs=scenario.inputs,
     )
 

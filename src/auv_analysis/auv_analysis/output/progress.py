@@ -4,7 +4,7 @@ import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import (
@@ -13,6 +13,7 @@ from rich.progress import (
     ProgressColumn,
     SpinnerColumn,
     Task,
+    TaskID,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
@@ -22,11 +23,8 @@ from rich.segment import Segment
 
 from auv_dynamics.files.errors import printable
 
-if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
-
 T = TypeVar('T')
-counting: 'ContextVar[tuple[Progress, TaskID] | None]' = ContextVar('counting', default=None)
+counting: ContextVar[tuple[Progress, TaskID] | None] = ContextVar('counting', default=None)
 
 
 def each(entries: Iterable[T], total: int) -> Iterator[T]:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import stat
 import tempfile
 from collections import Counter
 from functools import cache
@@ -68,6 +69,7 @@ def recovered(
     """Messages, attachments and report of these bytes; a second repair changes nothing."""
     with tempfile.TemporaryDirectory() as root:
         path = put(Path(root) / 'bag', data)
+        path.chmod(0o666)  # which a umask takes from new files
         try:
             document = recover(path.parent).document()
         except (InputError, FailedError) as error:
@@ -78,6 +80,7 @@ def recovered(
             assert path.with_name('bag_0.mcap.damaged').read_bytes() == data
         else:
             assert path.read_bytes() == data
+        assert stat.S_IMODE(path.stat().st_mode) == 0o666
         before = states(path.parent)
         assert recover(path.parent).document()['changed'] is False
         assert states(path.parent) == before

@@ -75,3 +75,12 @@ def test_vehicle_of_which_only_M_is_known_is_refused(capsys):
     captured = capsys.readouterr()
     assert (end.value.code, len(captured.err.splitlines()), captured.out) == (2, 1, '')
     assert 'inertia_matrix: expected inertia and added_mass apart' in captured.err
+
+
+def test_the_vehicle_that_is_read_is_never_replaced(tmp_path, capsys):
+    path, text = tmp_path / 'mine.yaml', shipped('vehicles', 'lauv').read_text()
+    path.write_text(text)
+    with pytest.raises(SystemExit, match='2'):
+        main(['export-vehicle', str(path), '--out', str(path), '--overwrite'])
+    assert f'{path}: --out' in capsys.readouterr().err
+    assert path.read_text() == text

@@ -8,10 +8,12 @@ import pytest
 from auv_analysis.cli import main, scenario_runs
 from auv_analysis.graph.domain import (
     LARGEST,
+    RANGE,
     VARIABLE,
     chosen_domain,
     joined_domain,
     own_domain,
+    place_of,
 )
 from auv_dynamics.files.errors import InputError
 
@@ -50,6 +52,11 @@ def test_who_joins_a_graph_is_on_the_domain_of_every_ros_program(monkeypatch) ->
     assert joined_domain(None) == 0
     monkeypatch.setenv(VARIABLE, '7')
     assert (joined_domain(None), joined_domain(3)) == (7, 3)
+
+
+def test_a_graph_that_other_machines_hear_is_not_called_local(monkeypatch) -> None:
+    monkeypatch.setenv(RANGE, 'SUBNET')
+    assert place_of(7) == f'{VARIABLE}=7, {RANGE}=SUBNET'
 
 
 @pytest.mark.parametrize('participant', [0, 1, 4])

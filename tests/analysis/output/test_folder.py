@@ -16,7 +16,7 @@ import pytest
 
 from auv_analysis.cli import main, scenario_runs
 from auv_analysis.graph import recorded_runs
-from auv_analysis.output.folder import check_free, results_folder
+from auv_analysis.output.folder import check_free, results_folder, sha256_of, write_manifest
 from auv_analysis.output.new_files import replacing, unfinished_name, write_text
 from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.files.shipped import shipped
@@ -370,10 +370,15 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize('command', ['simulate', 'run'])
-def test_folder_that_holds_the_inputs_is_refused(command, project, capsys) -> None:
+@pytest.mark.parametrize('listed', [False, True])
+@pytest.mark.parametrize('command', ['simulate', 'run', 'linearize', 'atlas --only'])
+def test_folder_that_holds_the_inputs_is_refused(command, listed, project, capsys) -> None:
+    command, *options = command.split()
+    if listed:  # as files of ours are, which may be replaced
+        write_manifest(project, {path.name: sha256_of(path) for path in project.iterdir()})
     before = {path: path.read_text() for path in project.iterdir()}
-    arguments = [command, str(project / 'scenario.yaml'), '--out', str(project), '--overwrite']
+    given = project / ('scenario.yaml' if command in ('simulate', 'run') else 'vehicle.yaml')
+    arguments = [command, *options, str(given), '--out', str(project), '--overwrite']
     with pytest.raises(SystemExit) as end:
         main.main(arguments)
     lines = capsys.readouterr().err.splitlines()

@@ -5,6 +5,7 @@ from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -75,6 +76,19 @@ def test_an_earlier_file_is_not_replaced_unasked(monkeypatch, capsys, tmp_path) 
         main(['export-rerun', str(tmp_path / 'gvc')])
     assert ended.value.code == 2
     assert 'expected a new file, or --overwrite, found an existing file' in capsys.readouterr().err
+
+
+def test_out_is_heard_and_the_bag_never_replaced(monkeypatch, capsys, tmp_path) -> None:
+    monkeypatch.setattr(rerun_export, 'library', lambda: None)
+    monkeypatch.setattr(rerun_export, 'export', lambda _, out: out.write_text('ours') or SAMPLES)
+    monkeypatch.setattr('auv_analysis.bag.load.open_bag', lambda _: SimpleNamespace(run=made_run()))
+    bag, out = tmp_path / 'gvc.mcap', tmp_path / 'mine.rrd'
+    bag.write_text('theirs')
+    main(['export-rerun', str(bag), '--out', str(out)])
+    assert out.read_text() == 'ours'
+    with pytest.raises(SystemExit, match='2'):
+        main(['export-rerun', str(bag), '--out', str(bag), '--overwrite'])
+    assert bag.read_text() == 'theirs'
 
 
 def exported(run: Run, path: Path) -> dict[str, dict[str, list]]:

@@ -27,7 +27,7 @@ from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.output import Storage
 from auv_analysis.bag.ros2msg import schema_text
 from auv_analysis.bag.writer import BagWriter
-from auv_analysis.cli import main
+from auv_analysis.cli import main, scenario_runs
 from auv_analysis.cli.main import COMMANDS
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
 from auv_analysis.output.folder import SWEEP, sha256_of, write_manifest
@@ -388,7 +388,6 @@ def test_analyze_refuses_a_bag_with_a_bad_attachment(what, recording, folder, ca
 @pytest.fixture
 def stopped(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     """Folders that a command asked for; it ends, all well, where the summaries would begin."""
-    from auv_analysis.cli import scenario_runs
     from auv_analysis.output import folder
 
     asked: list[Path] = []
@@ -455,6 +454,15 @@ def test_a_controller_that_diverges_leaves_the_others_their_report(folder, capsy
     assert errors[-1] == 'case1_lauv, cl: the closed loop diverges, not finite from t = 0.27 s'
     assert json.loads(Path('lauv/summary.json').read_text()).keys() == {'gvc'}
     assert Path('lauv/report.html').exists()
+
+
+def test_of_several_that_fail_the_first_is_named(folder, monkeypatch, capsys) -> None:
+    def diverge(_scenario: object, name: str, _hold: str) -> None:
+        raise ArithmeticError(f'{name} diverges')
+
+    monkeypatch.setattr(scenario_runs, 'simulate', diverge)
+    assert _exit_code('simulate', 'case1') == 1
+    assert capsys.readouterr().err.splitlines()[-1] == 'gvc diverges'
 
 
 CALLBACK = ctypes.CFUNCTYPE(None)

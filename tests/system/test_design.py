@@ -6,6 +6,8 @@ import pytest
 from helpers.node_processes import auv
 
 from auv_analysis.cli import main
+from auv_analysis.studies.design import search
+from auv_dynamics.files.errors import FailedError
 
 FILES = {
     'design.json', 'summary.json', 'summary_before.json', 'vehicle.yaml', 'vehicle_before.yaml',
@@ -53,3 +55,17 @@ def test_a_vehicle_without_couplings_is_told_so(options, tmp_path, monkeypatch, 
     assert 'M is diagonal' in text
     if '--json' in options:
         assert json.loads(text)['measures'] == []
+
+
+def test_the_coupling_that_is_asked_for_is_reduced(tmp_path, monkeypatch):
+    asked = []
+
+    def propose(_setting, target, _shown):
+        asked.append(target)
+        raise FailedError('enough')
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(search, 'propose', propose)
+    with pytest.raises(SystemExit):
+        main.main(['design', 'rexrov', '--reduce', 'delta_pi.pitch'])
+    assert asked == ['delta_pi.pitch']

@@ -147,6 +147,8 @@ def test_a_frame_of_ardusub_has_so_many_motors(frame: str, motors: int) -> None:
         (['RATE', 'IMU[0]'], [('RATE', 'R P Y')], None),
         (['IMU[0]', 'IMU'], [('IMU[0]', 'GyrX GyrY GyrZ')], None),
         (['NKF1', 'XKF1[0]'], [('XKF1[0]', '')], 'from attitude'),
+        (['NKF1[0]', 'NKF1'], [('NKF1[0]', '')], 'from attitude'),
+        (['NKF1'], [('NKF1', '')], 'from attitude'),
         ([], [], 'from attitude'),
     ],
 )
@@ -165,12 +167,26 @@ def test_other_systems_are_left_out(run, pulses, tmp_path) -> None:
     ghost = [
         (time + 1, (7, 1), message) for time, sender, message in heard if sender == logs.VEHICLE
     ][::2]  # fmt: skip
-    log = logs.write_tlog(tmp_path / 'two.tlog', sorted([*heard, *ghost], key=lambda one: one[0]))
+    both = sorted([*heard, *ghost], key=lambda one: one[0])
+    log = logs.write_tlog(tmp_path / 'two.tlog', both)
     contents = survey(log)
     assert contents.counts['ATTITUDE'] == 200
     assert sum('read system 1, component 1' in note for note in contents.notes) == 1
     notes: list[str] = []
     assert len(list(messages(log, ['ATTITUDE', 'HEARTBEAT'], notes))) == 201
+    silent = [one for one in both if 'HEARTBEAT' not in str(one[2])]
+    with pytest.raises(InputError, match=r'heartbeats of the autopilot.* from 1\.1, 7\.1'):
+        survey(logs.write_tlog(tmp_path / 'silent.tlog', silent))
+
+
+def test_messages_with_a_wrong_checksum_are_left_out_and_counted(run, pulses, tmp_path) -> None:
+    log = logs.write_tlog(tmp_path / 'x.tlog', logs.telemetry(run.part(slice(20)), pulses[:20]))
+    data = bytearray(log.read_bytes())
+    data[-1] ^= 1  # of the last servo outputs
+    log.write_bytes(data)
+    notes: list[str] = []
+    assert len(list(messages(log, ['SERVO_OUTPUT_RAW'], notes))) == 19
+    assert 'x.tlog: 1 messages left out, whose checksum is wrong' in notes
 
 
 def test_servo_outputs_keep_their_clock_when_it_wraps(run, pulses, tmp_path, monkeypatch) -> None:

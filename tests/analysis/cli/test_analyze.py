@@ -4,11 +4,17 @@ from argparse import Namespace
 from html import unescape
 from pathlib import Path
 
+import numpy as np
 import pytest
+from helpers.damaged_bags import STEP, UPRIGHT
+from helpers.made_messages import Bag, odometry, serialized, stamped
 from made_bags import make_bag
 
 from auv_analysis.bag import reading
+from auv_analysis.bag.step_topics import ODOMETRY, TWIST, WRENCH
 from auv_analysis.cli import analyze, main
+from auv_analysis.output.folder import sha256_of, write_manifest
+from auv_dynamics.files.errors import InputError
 
 
 @pytest.mark.usefixtures('unrendered')
@@ -53,3 +59,27 @@ def test_results_are_named_after_the_scenarios(scenarios, folder, tmp_path, monk
     with analyze._folder(scenarios, [], Namespace(out=None, map=None, overwrite=False)):
         pass
     assert [path.name for path in Path('runs').iterdir()] == [f'analyze_{folder}']
+
+
+def test_the_mapping_file_that_is_read_is_never_replaced(tmp_path) -> None:
+    told = tmp_path / 'report.html'
+    told.touch()
+    write_manifest(tmp_path, {told.name: sha256_of(told)})
+    options = Namespace(out=tmp_path, map=str(told), overwrite=True)
+    with pytest.raises(InputError, match=str(told)), analyze._folder(['x'], [], options):
+        pass
+
+
+def test_of_many_bags_the_vehicle_is_heard_and_that_no_report_is_wanted(tmp_path) -> None:
+    bag = Bag(tmp_path / 'bag.mcap')
+    for k in range(20):
+        for topic, kind, message in (
+            ('/odom', ODOMETRY, odometry(k * STEP, UPRIGHT)),
+            ('/cmd_vel', TWIST, stamped('Twist', k * STEP, np.zeros(6))),
+            ('/wrench', WRENCH, stamped('Wrench', k * STEP, np.zeros(6))),
+        ):
+            bag.add(topic, kind, k * STEP, serialized(message))
+    many, out = [str(bag.close())] * 4, tmp_path / 'out'
+    main.main(['analyze', *many, '--vehicle', 'rexrov', '--no-report', '--out', str(out)])
+    assert (out / 'summary.json').exists()
+    assert not (out / 'report.html').exists()

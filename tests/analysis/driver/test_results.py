@@ -16,6 +16,7 @@ from rich.console import Console
 
 from auv_analysis.cli import check_driver
 from auv_analysis.cli.main import main, parser
+from auv_analysis.driver import report
 from auv_analysis.driver.checks import (
     CHECKS,
     GROUPS,
@@ -247,6 +248,13 @@ def test_a_folder_that_is_there_is_refused_before_anything_is_heard(tmp_path, ca
     assert ended.value.code == 2
     assert '--overwrite' in capsys.readouterr().err
     assert (tmp_path / 'mine.txt').read_text() == 'kept'
+
+
+def test_results_of_an_earlier_check_are_replaced_when_asked(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(report, 'write_results', lambda out, *_: (out / 'check.json').touch())
+    options = SimpleNamespace(json=True, out=tmp_path / 'out', overwrite=True, vehicle=None)
+    for _ in range(2):
+        check_driver._conclude(options, listened())
 
 
 def test_nothing_is_sent_unless_those_pass_on_whom_safety_rests() -> None:

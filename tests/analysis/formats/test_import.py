@@ -188,9 +188,15 @@ def test_products_of_inertia_by_either_convention(imported):
         assert_array_equal(found, sign * np.tile([0.01, 0.02, 0.03], 2))
 
 
-def test_a_list_may_say_where_buoyancy_acts(imported):
-    vehicle, _ = imported('list.m', f'{BLUEROV2}xB = 0.01; yB = 0.02; zB = -0.03', *LIST)
+def test_a_list_may_say_where_buoyancy_acts_unless_the_user_does(imported):
+    text = f'{BLUEROV2}xB = 0.01; yB = 0.02; zB = -0.03'
+    vehicle, document = imported('list.m', text, *LIST)
     assert_array_equal(vehicle.r_B, [0.01, 0.02, -0.03])
+    assert 'water_density' in ' '.join(document['assumed'])
+    point = '--center-of-buoyancy', '0.1', '0.2', '0.3'
+    vehicle, document = imported('list.m', text, *LIST, *point, '--water-density', '1025')
+    assert_array_equal(vehicle.r_B, [0.1, 0.2, 0.3])
+    assert 'water_density' not in ' '.join(document['assumed'])
 
 
 def test_a_list_names_mass_and_water_as_papers_do(imported):

@@ -141,6 +141,12 @@ def test_in_real_time_a_law_is_asked_while_it_was_in_charge(tmp_path: Path, told
     assert (apart.relative, apart.within) == (None, np.abs(found.tau).max())
 
 
+def test_of_a_bag_that_was_not_finished_it_is_said(tmp_path: Path) -> None:
+    bag = write(tmp_path / 'bag.mcap')
+    bag.write_bytes(bag.read_bytes()[:-100])  # its summary is gone
+    assert any('was not finished' in note for note in recorded_loop(bag).notes)
+
+
 def test_odometry_that_only_the_controller_heard_is_counted(tmp_path: Path) -> None:
     lost = tuple(range(20, 24))
     loop = recorded_loop(write(tmp_path / 'bag.mcap', params=REAL_TIME, lost=lost))

@@ -1,6 +1,8 @@
 """What of a bag is played under which names, and what counts as a command."""
 
+from collections import Counter
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -183,3 +185,17 @@ def test_a_replay_joins_the_domain_that_is_asked_for(monkeypatch) -> None:
     options = parser(['replay']).parse_args(['replay', 'bag', '--domain-id', '7'])
     with pytest.raises(FailedError, match='joins 7'):
         replay.run(options)
+
+
+def test_the_document_says_what_went_wrong() -> None:
+    bag = BagIndex(Path('bag'), first=0, notes=['damaged'])
+    chosen = SimpleNamespace(left_out={})
+    plan = SimpleNamespace(index=bag, begin=0, end=1, selection=chosen, gaps=[])
+    guard = SimpleNamespace(stopped='a pilot')
+    player = SimpleNamespace(
+        names={}, published=Counter(), now_ns=0, loops=0, guard=guard, silent=['/odom']
+    )
+    keyboard = SimpleNamespace(ended=False)
+    document = replay._document(SimpleNamespace(player=player, plan=plan), keyboard, 1.0)
+    told = {'commands_stopped': 'a pilot', 'silent': ['/odom'], 'notes': ['damaged']}
+    assert told.items() <= document.items()

@@ -93,6 +93,9 @@ def test_the_verdict_stands_above_the_tables_and_first_in_the_report(
     first = found[0][0].text
     assert first.startswith('gvc tracks better than cl')
     assert shown.index('gvc tracks better than cl') < shown.index('gvc: law gvc')
+    main.main(['simulate', str(path), '--no-report', '--out', str(tmp_path / 'brief')])
+    assert first in capsys.readouterr().err
+    assert len(found) == 1
 
 
 ONE, HALF, TWICE = [1.0] * 6, [0.5] * 6, [2.0] * 6

@@ -3,6 +3,7 @@
 import io
 import math
 import sys
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import Any
@@ -10,6 +11,8 @@ from typing import Any
 import pytest
 from rich.console import Console
 
+from auv_analysis.cli import watch
+from auv_analysis.cli.main import parser
 from auv_analysis.watch import screen as module
 from auv_analysis.watch.monitor import HEARD, GraphMonitor
 from auv_analysis.watch.screen import (
@@ -303,3 +306,23 @@ def test_what_is_wrong_is_shown_while_it_waits(monkeypatch) -> None:
     first, second, *_ = shown[-1].alerts
     assert first.text.endswith('; waiting')
     assert second.text == 'incompatible QoS'
+
+
+def test_the_command_shows_what_it_is_asked_for(monkeypatch) -> None:
+    asked = []
+
+    def session(monitor: GraphMonitor, _: object, single: bool, rate: float | None) -> Any:
+        asked.append((single, rate))
+        return SimpleNamespace(run=lambda *_, once: monitor.snapshot(0.0))
+
+    monkeypatch.setattr(module, 'Session', session)
+    monkeypatch.setattr(module, 'Display', lambda *, stderr, single: nullcontext(single))
+    monkeypatch.setattr('auv_analysis.output.keyboard.Keyboard', nullcontext)
+    monkeypatch.setattr('auv_analysis.graph.supervisor.give_way', lambda: None)
+    monkeypatch.setattr('auv_analysis.graph.domain.join_domain', lambda asked: asked)
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')  # as it would
+    node = SimpleNamespace(Listener=lambda *_: SimpleNamespace(close=lambda: None))
+    monkeypatch.setitem(sys.modules, 'auv_analysis.nodes.watch_node', node)
+    for line in ('', '--rate 9', '--once', '--for 1'):
+        watch.run(parser(['watch']).parse_args(['watch', '--domain-id', '7', *line.split()]))
+    assert asked == [(False, None), (False, 9.0), (True, None), (True, None)]

@@ -186,6 +186,8 @@ def test_a_sampled_scenario_with_a_set_point_of_its_own(tmp_path):
     result, out = designed('rexrov', tmp_path, str(tmp_path / 's.yaml'))
     assert result.document['hold'] == 'zoh'
     assert (out / 'setpoint.csv').read_text() == (tmp_path / 'way.csv').read_text()
+    written = yaml.safe_load((out / 'scenario.yaml').read_text())
+    assert written['setpoint'] == {'file': 'setpoint.csv'}, 'the folder needs no other one'
     summary = summarize(simulate(load_scenario(out / 'scenario.yaml'), 'firm', 'zoh'))
     for row in result.document['measures']:
         assert row['after'] == figure(summary, row['name'])

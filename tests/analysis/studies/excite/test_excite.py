@@ -10,6 +10,7 @@ from helpers.sea_trials import recorded
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.cli import main
+from auv_analysis.cli.excite import bounds_of
 from auv_analysis.output.folder import listed_in, results_folder
 from auv_analysis.studies.excite import excite as searching
 from auv_analysis.studies.excite.drive import (
@@ -82,6 +83,14 @@ def test_results_take_the_place_of_earlier_ones(excited, tmp_path: Path) -> None
             files = {path.name for path in results_of(excited).write(folder)}
     assert 'excite.json' in files
     assert files <= listed_in(out).keys()
+
+
+def test_a_vehicle_without_thrusters_has_more_than_what_holds_it_still() -> None:
+    vehicle = load_vehicle('herman2018')
+    options = main.parser(['excite']).parse_args(['excite', 'herman2018'])
+    still = abs(vehicle.g(np.zeros(6)))
+    assert still[2] > 0.0
+    assert np.all(bounds_of(options, vehicle).wrench > still)
 
 
 def test_what_the_command_line_asks_for_is_what_is_searched(tmp_path, monkeypatch) -> None:
@@ -257,7 +266,9 @@ def test_a_vehicle_of_ones_own_is_named_where_it_lies(tmp_path: Path, monkeypatc
     request = request_of('mine.yaml', duration=2.0)
     family = Family.of(request, np.random.default_rng(0))
     wave = family.waves(np.zeros((1, 2 * len(family.driven)))).part(0)
-    assert scenario_of(request, wave)['vehicle'] == str(tmp_path / 'mine.yaml')
+    data = scenario_of(request, wave)
+    assert data['vehicle'] == str(tmp_path / 'mine.yaml')
+    assert data['sensors'] == {'velocity_noise': 0.005, 'attitude_noise': 0.003}
 
 
 def test_each_seed_draws_other_phases(monkeypatch) -> None:

@@ -17,6 +17,7 @@ from pyarrow import parquet
 from auv_analysis.cli import identify as identify_command
 from auv_analysis.cli import predict as predict_command
 from auv_analysis.cli.main import main
+from auv_analysis.output.folder import results_folder
 from auv_analysis.report.results import Results
 from auv_analysis.studies.identify import identify, prediction
 from auv_analysis.studies.identify.bags import read_records
@@ -37,11 +38,12 @@ def auv(capsys, *arguments: object) -> tuple[int, str]:
     return code, capsys.readouterr().err
 
 
-def recording(folder, duration):
+def recording(folder, duration, rates=1.0):
     """A trial as our nodes would record it: odometry with noise, commanded wrench."""
     record, run = sea_trials.trial(folder, 'herman2018', 5, duration=duration)
     part = motion(run, enu=False)
-    noisy = part._replace(attitude=record.attitude[:, [1, 2, 3, 0]], twist=record.velocity)
+    twist = record.velocity * ([1.0] * 3 + [rates] * 3)
+    noisy = part._replace(attitude=record.attitude[:, [1, 2, 3, 0]], twist=twist)
     frames = 'odom_ned', 'base_link_fsd'
     return write(folder / 'bag', simple(noisy, Maker(), '/odom', '/wrench', frames), Maker())
 
@@ -119,13 +121,19 @@ def test_intervals_on_request_stand_beside_the_others(bag, tmp_path, approved):
     approved.folder(out)
 
 
-def test_the_file_predicts_the_recording(bag, identified, tmp_path, capsys):
+def test_the_file_predicts_the_recording(bag, identified, tmp_path, monkeypatch, capsys):
+    read = predict_command.read
+    monkeypatch.setattr(predict_command, 'read', lambda *a: read(*a)._replace(notes=['odd']))
     vehicle = identified / 'vehicle.yaml'
     lag = ('--lag', sea_trials.LAG, '--delay', sea_trials.DELAY)
-    code, _ = auv(capsys, 'predict', bag, '--vehicle', vehicle, '--out', tmp_path / 'p', *lag)
-    assert code == 0
+    main(['predict', *map(str, (bag, '--vehicle', vehicle, '--out', tmp_path / 'p', *lag))])
+    printed = capsys.readouterr().out
     document = json.loads((tmp_path / 'p' / 'predict.json').read_text(encoding='utf-8'))
     assert 'better than persistence and better than black box' in document['verdict']
+    assert document['notes'] == ['odd']
+    assert document['verdict'] in ' '.join(printed.split())
+    assert 'Open-loop prediction of what was held out' in printed
+    assert (tmp_path / 'p' / 'figures' / 'prediction.png').exists()
 
 
 def test_a_recording_that_contradicts_the_prior_gives_no_file(bag, tmp_path, capsys):
@@ -199,13 +207,30 @@ def test_refusals(short, extra, said, tmp_path, capsys):
     assert not (tmp_path / 'x').exists()
 
 
+def test_rates_that_are_not_those_of_the_attitude_are_refused(tmp_path, capsys):
+    given = recording(tmp_path, 3.0, rates=-1.0), '--vehicle', 'herman2018'
+    code, error = auv(capsys, 'identify', *given, '--out', tmp_path / 'x')
+    assert code == 2
+    assert 'expected an angular velocity that is the rate of the attitude' in error
+
+
+def test_a_part_may_have_one_end():
+    assert identify_command._span('20:') == (20.0, np.inf)
+    assert identify_command._span(':30') == (0.0, 30.0)
+
+
 def test_what_the_command_line_asks_for_is_what_is_done(short, tmp_path, monkeypatch, capsys):
-    asked = []
+    asked, kept = [], []
+
+    def folder(*given, inputs, **options):
+        kept.append(inputs)
+        return results_folder(*given, inputs=inputs, **options)
 
     def work(*given, **options):
         asked.append((*given, *options.values()))
         raise FailedError('enough')
 
+    monkeypatch.setattr('auv_analysis.output.folder.results_folder', folder)
     monkeypatch.setattr(identify, 'identify', work)
     monkeypatch.setattr(identify, 'compared', work)
     monkeypatch.setattr(prediction, 'held_of', lambda held, _: held)
@@ -234,6 +259,7 @@ def test_what_the_command_line_asks_for_is_what_is_done(short, tmp_path, monkeyp
     learnt, held, _, known, _ = asked[-1]
     assert held[-1].end < 3.5 < learnt[-1].end
     assert known.believed == {'M.surge.surge': (280.0, 5.0)}
+    assert believed in kept[-1]
 
 
 @pytest.mark.parametrize(('entry', 'line'), [

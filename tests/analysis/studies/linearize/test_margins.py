@@ -25,6 +25,7 @@ from auv_analysis.studies.linearize.margins import (
     stable,
 )
 from auv_analysis.studies.linearize.sampled_loop import behind_rotors
+from auv_dynamics.files.errors import FailedError
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.thrusters import Rotor
 
@@ -397,6 +398,16 @@ def test_the_command_prints_margins_and_writes_them(tmp_path, monkeypatch, capsy
     assert document['models']['gvc']['margins'] == expected
     assert (out / 'margins.parquet').is_file()
     assert (out / 'figures' / 'bode_gvc.png').is_file()
+
+    def refused(setting):
+        asked.append((setting, {}))
+        raise FailedError('enough')
+
+    monkeypatch.setattr(margins, 'stability_margins', refused)
+    with pytest.raises(SystemExit):
+        main([*line, '--nu0', *'123456', '--attitude', *'789'])
+    moving, _ = asked[-1]
+    assert (moving.nu0, moving.eta0) == ([1, 2, 3, 4, 5, 6], [0, 0, 0, 7, 8, 9])
 
 
 @pytest.mark.parametrize(

@@ -38,6 +38,10 @@ def test_command_prints_one_document_and_says_where(command: Callable, files: Pa
     document = json.loads(out)
     assert (code, document['rows'], document['dataset']) == (0, 32, 'runs/small/rollouts')
     assert document['controllers']['cl'] == {'ok': ROLLOUTS, 'diverged': 0, 'refused': 0}
+    assert sorted(document['paths']) == [
+        'controllers.*.k_D', 'setpoint.surge.offset', 'vehicle', 'vehicle.damping.linear[0]'
+    ]  # fmt: skip
+    assert ['cl', str(ROLLOUTS), '0', '0'] in [line.split() for line in lines]
     assert lines[-1] == "rollouts: 32 rows, pandas.read_parquet('runs/small/rollouts')"
     assert len(pyarrow.parquet.read_table(files / document['dataset'])) == 32
     assert json.loads(command('--json')[1])['rollouts_before'] == ROLLOUTS

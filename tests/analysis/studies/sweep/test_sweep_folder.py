@@ -1,6 +1,8 @@
 """The folder of a sweep: gone on with after a stop, refused where something has changed."""
 
 import json
+import platform
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -110,14 +112,31 @@ def test_folder_is_refused_when_the_vehicle_has_changed(files: Path) -> None:
         run(files)
 
 
-def test_folder_is_refused_when_the_versions_differ(files: Path) -> None:
-    run(files)
+def test_folder_is_refused_when_machine_or_versions_differ(files: Path, monkeypatch) -> None:
+    vary = '{morris: {controllers.*.k_D: {uniform: {from: 6, to: 12}}}, count: 2}'
+    (files / 'campaign.yaml').write_text(f'name: x\nscenario: scenario.yaml\nvary: [{vary}]\n')
+
+    def begun() -> None:
+        campaign = load_campaign(files / 'campaign.yaml')
+        with sweep_folder(files / 'out', campaign, overwrite=False):
+            pass
+
+    begun()
+    version = metadata.version
+    for where, name, other, key in (
+        (metadata, 'version', lambda of: '1.0' if of == 'SALib' else version(of), 'SALib'),
+        (platform, 'machine', lambda: 'another', 'machine'),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(where, name, other)
+            with pytest.raises(InputError, match=f'versions.{key}: '):
+                begun()
     path = files / 'out/sweep.json'
     manifest = json.loads(path.read_text())
     manifest['versions']['numpy'] = '1.0'
     path.write_text(json.dumps(manifest))
     with pytest.raises(InputError, match=r'versions.numpy: expected "1.0" as when it was begun'):
-        run(files)
+        begun()
 
 
 def test_folder_that_another_process_sweeps_into_is_refused(files: Path) -> None:

@@ -12,7 +12,7 @@ from helpers.report_pages import check_numbers
 from helpers.tunings import GVC, SAME_CL, write
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.cli import main
+from auv_analysis.cli import main, tune
 from auv_analysis.studies.tune import search as searching
 from auv_analysis.studies.tune.cost import measures_of_run
 from auv_analysis.studies.tune.perturbations import Perturbations, Spread, monte_carlo
@@ -72,6 +72,12 @@ def test_folder_document_and_files_agree(command: Callable, tmp_path: Path, appr
     said = {sentence['text'] for sentence in document['verdict']}
     entries = document['controllers'].items()
     assert {f'{name}: {text}.' for name, entry in entries for text in entry['remarks']} <= said
+
+
+def test_without_law_every_shipped_one_is_tuned_the_own_first(tmp_path: Path) -> None:
+    scenario = load_scenario(write(tmp_path, {'gvc': GVC}))
+    options = main.parser(['tune']).parse_args(['tune', 's.yaml'])
+    assert tune._request(options, scenario).laws == ('gvc', 'cl', 'pid', 'smc')
 
 
 def _equal(document: dict, measure: str, tolerance: float) -> None:

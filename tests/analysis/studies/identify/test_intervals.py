@@ -1,5 +1,6 @@
 """What `auv identify` does on request: observer, bootstrap, profiles; whiteness of residuals."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -67,6 +68,24 @@ def test_residuals_are_white_where_the_model_explains_all(quiet):
     rows = whiteness(list(quiet.problem.misfit(quiet.fit)), quiet.problem.step)
     assert [row['verdict'] for row in rows] == ['white'] * 6
     assert 'are white' in told(rows)
+
+
+@pytest.mark.parametrize('jitter', [5e-6, 4e-3])
+def test_stamps_of_a_real_clock_change_no_verdict(quiet, disturbed, jitter):
+    """Steps of 20 ms; a sample that lacks is no jitter."""
+    rng = np.random.default_rng(0)
+    for one in (quiet, disturbed[0.0]):
+        step, pairs = one.problem.step, list(one.problem.misfit(one.fit))
+        even = whiteness(pairs, step)
+        off = [jitter / step * rng.uniform(-0.5, 0.5, len(segment.at)) for segment, _ in pairs]
+        late = [(replace(segment, at=segment.at + by), e)
+                for (segment, e), by in zip(pairs, off, strict=True)]  # fmt: skip
+        rows = whiteness(late, step)
+        assert [row['verdict'] for row in rows] == [row['verdict'] for row in even]
+        assert_allclose([row['slow'] for row in rows], [row['slow'] for row in even], rtol=0.1)
+    kept = np.delete(np.arange(len(pairs[0][0].at)), 30)
+    holed = replace(pairs[0][0], at=pairs[0][0].at[kept], nu=pairs[0][0].nu[kept])
+    assert whiteness([(holed, pairs[0][1][kept])], step) == []
 
 
 def test_residuals_are_not_white_under_a_disturbance(disturbed):

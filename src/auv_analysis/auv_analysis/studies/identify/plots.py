@@ -22,7 +22,7 @@ from auv_analysis.report.plots import (
 )
 from auv_analysis.studies.identify.identified import Identified
 from auv_analysis.studies.identify.prediction import by_name
-from auv_analysis.studies.identify.record import Segment
+from auv_analysis.studies.identify.record import Segment, even_period
 from auv_dynamics.vehicle import DOFS
 
 LOOKS: dict[str, dict[str, Any]] = {
@@ -149,8 +149,9 @@ def _residuals(found: Identified, pairs: Pairs) -> Drawn:
         spectra = []
         for segment, e in pairs:
             there = np.isfinite(segment.nu[:, i])
-            if there.sum() > 16 and np.ptp(np.diff(segment.at[there])) < 1e-6:
-                own = rate / float(np.diff(segment.at[there])[0])
+            period = even_period(segment.at[there])
+            if period and there.sum() > 16:
+                own = rate / period
                 f, p = welch(e[there, i], own, nperseg=int(there.sum()))
                 spectra.append(p * own / 2)
         if spectra:

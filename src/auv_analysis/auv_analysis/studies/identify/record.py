@@ -17,6 +17,7 @@ SMOOTHING = 0.4  # s, window of the local polynomials from which states are read
 PAUSE = 0.5  # s without a measurement of something that end no stretch where no gap was told
 SHORTEST = 1.0  # s of a record
 ROUNDED = 1e-12  # m/s, rad/s, rad
+EVEN = 0.5  # of the mean interval: where all lie within, clocks jitter but no sample lacks
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,6 +248,12 @@ def _measured(record: Record, begin: float, end: float) -> tuple[np.ndarray, ...
     nu[np.searchsorted(t, record.velocity_t[keep[0]])] = record.velocity[keep[0]]
     q[np.searchsorted(t, record.attitude_t[keep[1]])] = record.attitude[keep[1]]
     return t, nu, q
+
+
+def even_period(at: np.ndarray) -> float | None:
+    """Mean interval of rising times (r,), their unit; None where one lacks or there is no other."""
+    apart = np.diff(at)
+    return float(apart.mean()) if len(apart) and np.ptp(apart) < EVEN * apart.mean() else None
 
 
 def described(record: Record) -> dict[str, Any]:

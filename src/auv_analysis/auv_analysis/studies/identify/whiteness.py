@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from auv_analysis.output.text import join, number
-from auv_analysis.studies.identify.record import Segment
+from auv_analysis.studies.identify.record import Segment, even_period
 from auv_dynamics.vehicle import DOFS
 
 LAGS = 20  # of the autocorrelation, at most
@@ -32,10 +32,10 @@ def whiteness(pairs: Sequence[tuple[Segment, np.ndarray]], step: float) -> list[
     """
     rows: list[dict[str, Any]] = []
     for i, dof in enumerate(DOFS):
-        some = [(e[there, i], float(apart[0]) * step) for segment, e in pairs
+        some = [(e[there, i], period * step) for segment, e in pairs
                 for there in [np.isfinite(segment.nu[:, i])]
-                for apart in [np.diff(segment.at[there])]
-                if len(apart) > 2 * LAGS and np.ptp(apart) < 1e-6]  # fmt: skip
+                for period in [even_period(segment.at[there])]
+                if period and there.sum() > 2 * LAGS + 1]  # fmt: skip
         if some:
             rows.append({'dof': dof, **_of(some)})
     least = CERTAIN / max(len(rows), 1)
@@ -60,7 +60,7 @@ def _of(some: Sequence[tuple[np.ndarray, float]]) -> dict[str, float]:
         lines = np.abs(np.fft.rfft(e)) ** 2
         lines[1 : (len(e) + 1) // 2] *= 2.0
         doubled = np.r_[1.0, np.full(len(lines) - 1, 2.0)]
-        is_slow = np.fft.rfftfreq(len(e), period) <= SLOW
+        is_slow = np.fft.rfftfreq(len(e), period) < 0.999 * SLOW  # on it, rounding decides
         slow += lines[is_slow].sum(), lines.sum()
         below += doubled[is_slow].sum(), doubled.sum()
     return {

@@ -91,6 +91,17 @@ def test_an_angular_velocity_that_is_not_the_rate_of_the_attitude_is_named(run, 
     assert_allclose(mended.nu[inner], truth[inner], atol=3e-3)
 
 
+def test_an_angular_velocity_of_the_other_sign_is_said_to_be_that(run, tmp_path) -> None:
+    bag = bag_of(replace(run, nu=run.nu * [1, 1, 1, 1, 1, -1]), tmp_path, tau=run)
+    (note,) = said(loaded(bag, **KEYS), 'not the rate of the attitude')
+    assert ' rad/s, with the other sign;' in note
+    bag = bag_of(replace(run, nu=run.nu * [1, 1, 1, 1, 1, 0.5]), tmp_path / 'half', tau=run)
+    (note,) = said(loaded(bag, **KEYS), 'not the rate of the attitude')
+    half, whole, apart = (float(word) for word in note.split() if word[0] == '0')
+    assert 'apart' in note
+    assert (half / whole, apart / whole) == pytest.approx((0.5, 0.5), abs=0.03)
+
+
 def test_a_late_velocity_is_told_and_taken_off(run, tmp_path) -> None:
     late = 0.2
     maker, seen = Maker(), motion(run, enu=True, keep=slice(None, None, 2))

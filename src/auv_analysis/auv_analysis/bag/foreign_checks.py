@@ -149,8 +149,11 @@ def _misread(pair: RatePair, i: int, fits: float) -> str:
     size = max(by_path, by_twist)
     if size <= max(STILL, one.noise) or apart <= fits * size:
         return ''
-    zero = '0 throughout' if not pair.velocity[:, i].any() else f'{by_twist:.2g}'
-    return f'{zero} in place of {by_path:.2g} rad/s'
+    if not one.velocity.any():
+        return f'0 throughout in place of {by_path:.2g} rad/s'
+    flipped = one._replace(velocity=-one.velocity).sizes[2] <= fits * size
+    how = 'with the other sign' if flipped else f'{apart:.2g} apart'
+    return f'{by_twist:.2g} in place of {by_path:.2g} rad/s, {how}'
 
 
 class Delay(NamedTuple):

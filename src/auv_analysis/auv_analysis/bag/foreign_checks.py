@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.polynomial import polyfit
 from scipy.integrate import cumulative_trapezoid
 
 from auv_analysis.bag.foreign_topics import FROM_ATTITUDE, MOVING, TopicMap
@@ -11,8 +12,12 @@ from auv_analysis.bag.foreign_tracks import unknown_angles
 from auv_analysis.bag.tracks import Track, at_times, between_gaps, integral
 from auv_analysis.metrics.local_polynomials import SMALLEST, rates
 from auv_analysis.metrics.pose_twist import (
+    ANGULAR,
+    CHILD,
     FITS,
+    LINEAR,
     STILL,
+    PoseTwist,
     RatePair,
     compare_rates,
     turn,
@@ -26,8 +31,10 @@ WORSE = 2.0  # times: from here on the other reading fits clearly better
 SMOOTH = 0.3  # s over which rates are fitted that are held against each other in time
 SMOOTHER = 0.6, 1.0  # s, the same of a wrench: noise that the controller answers brings it forward
 TOLD = 0.9  # of the acceleration that nothing else explains: what a wrench must explain of it
+SEEN = 0.5  # of the variance of a rate: what a velocity must explain of it; noise explains none
 FARTHEST, FINE = 1.0, 0.01  # s: delays that are tried, and between them
 COARSE = 5  # times as far apart at first: what is compared is smooth over many times that
+WIDE = 6  # times that: half of the parabola of a velocity; in a narrow one noise seems sharp
 MOST = 8000  # samples that are looked at
 PARTS = 20  # of the samples, by whose scatter the error of a delay is known
 CLEAR = 3.0  # standard errors: a delay that is no chance
@@ -45,16 +52,18 @@ def contradictions(tracks: Mapping[str, Track], otherwise: Track, mapping: Topic
     mapping : what was told
 
     """
-    moving = (one.twist_frame for one in mapping.sources.values() if one.role in MOVING)
     pose, twist = tracks['pose'], tracks['twist']
+    linear = next((one.topic for one in (*twist.parts, twist) if one.given[:3].any()), '')
+    frames = {one.topic: one.twist_frame for one in mapping.sources.values() if one.role in MOVING}
+    frame = frames.get(linear, 'child')
     notes = doubts_of_wrench(tracks)
     if not unknown_angles(pose, mapping):
         if mapping.rates != FROM_ATTITUDE:
             notes = doubts_of_rates(pose, twist) + notes
         notes = [
-            *doubts_of_motion(pose, twist, otherwise, next(moving, 'child')),
+            *doubts_of_motion(pose, twist, otherwise, frame),
             *notes,
-            *delays(tracks),
+            *delays(tracks, frame),
         ]
     return notes
 
@@ -167,7 +176,7 @@ class Delay(NamedTuple):
         return f'{self.value:.2f} ± {self.error:.2f} s'
 
 
-def delays(tracks: Mapping[str, Track]) -> list[str]:
+def delays(tracks: Mapping[str, Track], frame: str) -> list[str]:
     """Notes on signals that are late, as far as the recording itself tells.
 
     Velocity against position, angular velocity against attitude; the wrench against the
@@ -176,6 +185,7 @@ def delays(tracks: Mapping[str, Track]) -> list[str]:
     Parameters
     ----------
     tracks : 'pose' and 'twist', and 'wrench' and 'wrench_applied' where they are
+    frame : the twist_frame as told
 
     """
     pose, twist = tracks['pose'], tracks['twist']
@@ -183,9 +193,12 @@ def delays(tracks: Mapping[str, Track]) -> list[str]:
     ns = _together(pose, twist)[:MOST]
     if len(ns) >= SMALLEST:
         t, at, nu = (ns - ns[0]) / NANOSECONDS, at_times(pose, ns), at_times(twist, ns)
+        motion = PoseTwist(t, at[:, :3], at[:, 3:], nu)
+        # in the axes in which it was sent: to turn it takes the attitude of another time
+        linear = LINEAR[CHILD](motion) if frame == 'world' else (motion.travelled, nu[:, :3])
         signals = {
-            ('velocity', 'position'): (at[:, :3], turn(at[:, 3:], nu[:, :3])),
-            ('angular velocity', 'attitude'): (turned(at[:, 3:]), nu[:, 3:]),
+            ('velocity', 'position'): linear,
+            ('angular velocity', 'attitude'): ANGULAR[CHILD](motion),
         }
         for (late, early), (path, velocity) in signals.items():
             known = _measured(path, velocity)
@@ -224,7 +237,9 @@ def behind(t: np.ndarray, path: np.ndarray, velocity: np.ndarray) -> Delay | Non
         moved = np.stack([np.interp(t[inside] + delay, t, column) for column in late.T], axis=1)
         return _sums(((early[inside] - moved) ** 2).sum(axis=1))
 
-    return _clear(_least(-FARTHEST, left)[0])
+    found, least = _least(-FARTHEST, left, WIDE)
+    varied = float(early[inside].var(axis=0).sum() * inside.sum())
+    return None if least > (1.0 - SEEN) * varied else _clear(found)
 
 
 def acts_behind(pose: Track, twist: Track, wrench: Track) -> Delay | None:
@@ -276,7 +291,7 @@ def _acts_behind(
         X = X / np.maximum(np.abs(X).max(axis=0), TINY)
         return _sums(((y - X @ np.linalg.lstsq(X, y, rcond=None)[0]) ** 2).sum(axis=1))
 
-    found, least = _least(-FARTHEST / 2, left)
+    found, least = _least(-FARTHEST / 2, left, 1)
     return None if least > (1.0 - TOLD) * (y**2).sum() else found
 
 
@@ -292,15 +307,19 @@ def _sums(squares: np.ndarray) -> np.ndarray:
     return np.array([part.sum() for part in np.array_split(squares, PARTS)])
 
 
-def _least(first: float, left: Callable[[float], np.ndarray]) -> tuple[Delay | None, float]:
+def _least(
+    first: float, left: Callable[[float], np.ndarray], wide: int
+) -> tuple[Delay | None, float]:
     """The delay that leaves least, and how much; None at the edge of those that are tried.
 
-    Its error is that of an M-estimate, by the scatter of the parts' derivatives.
+    It is that of a parabola through what is left around it. Its error is that of an M-estimate, by
+    the scatter of the parts' derivatives.
 
     Parameters
     ----------
     first : the earliest delay, s; `FARTHEST` is the latest
     left : what a delay leaves (PARTS,) in each part of the time
+    wide : half of the parabola, in `COARSE`
 
     """
     found: dict[int, np.ndarray] = {}
@@ -313,15 +332,19 @@ def _least(first: float, left: Callable[[float], np.ndarray]) -> tuple[Delay | N
     last = round((FARTHEST - first) / FINE)
     near = min(range(0, last + 1, COARSE), key=total)
     k = min(range(max(near - COARSE, 0), min(near + COARSE, last) + 1), key=total)
-    if not 0 < k < last:
+    half = min(wide, k // COARSE, (last - k) // COARSE)
+    if not half:
         return None, total(k)
-    low, middle, high = (total(j) for j in (k - 1, k, k + 1))
-    curvature = (low - 2.0 * middle + high) / FINE**2
-    beside = 0.5 * FINE * (low - high) / max(low - 2.0 * middle + high, TINY)
-    slopes = (found[k + 1] - found[k - 1]) / (2.0 * FINE)
-    slopes = slopes - slopes.mean()
-    error = float(np.sqrt((slopes**2).sum()) / max(curvature, TINY))
-    return Delay(first + k * FINE + beside, error), middle
+    around = COARSE * np.arange(-half, half + 1)
+    every = [left(first + (k + j) * FINE) for j in around.tolist()]
+    _, slope, curve = polyfit(FINE * around, every, 2)
+    curvature = 2.0 * float(curve.sum())
+    if curvature <= 0.0:
+        return None, total(k)
+    beside = -float(slope.sum()) / curvature
+    slopes = slope + 2.0 * beside * curve
+    error = float(np.sqrt((slopes**2).sum())) / curvature
+    return Delay(first + k * FINE + beside, error), total(k)
 
 
 def _clear(delay: Delay | None) -> Delay | None:

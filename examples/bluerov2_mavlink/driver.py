@@ -31,8 +31,8 @@ LAST_WORDS = 1.5  # s for letting go at the end, at most
 class Driver(BulkNode):
     """Wiring: MAVLink on one side, odometry and wrench on the other."""
 
-    def __init__(self) -> None:
-        super().__init__('bluerov2_driver')
+    def __init__(self, **options: Any) -> None:
+        super().__init__('bluerov2_driver', **options)
         self.graph = NodeInterface(self)
         connection = declare(
             self, 'connection', str, 'udpin:127.0.0.1:14550', 'udpin or udpout:HOST:PORT'

@@ -74,8 +74,6 @@ class UdpPort:
                 data, address = self._socket.recvfrom(LARGEST)
             except BlockingIOError:
                 return
-            except ConnectionError:  # what was sent before found nobody
-                continue
             for message in self.parse(data):
                 yield message, address
 

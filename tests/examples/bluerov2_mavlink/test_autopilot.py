@@ -1,8 +1,12 @@
 """The simulated autopilot does what was seen of ArduSub itself."""
 
+import shlex
+from unittest.mock import Mock
+
+import ardusub_endpoint
 import numpy as np
 import pytest
-from ardusub_autopilot import ALT_HOLD, STABILIZE, Autopilot
+from ardusub_autopilot import ALT_HOLD, STABILIZE, Autopilot, Settings
 from helpers.mavlink_pair import SECOND, Booted
 from numpy.testing import assert_allclose
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -186,3 +190,27 @@ def test_the_pilot_gain_comes_with_its_older_stream_alone() -> None:
     bench.give(mavlink.MAVLink_request_data_stream_message(1, 1, 2, 2, 1))
     bench.run(1.0)
     assert bench.heard('NAMED_VALUE_FLOAT')[0].name == 'PilotGain'
+
+
+def test_the_endpoint_hears_every_option(monkeypatch) -> None:
+    class MadeError(Exception):
+        pass
+
+    made = Mock(side_effect=MadeError)
+    port = Mock()
+    monkeypatch.setattr(ardusub_endpoint, 'Autopilot', made)
+    monkeypatch.setattr(ardusub_endpoint, 'UdpPort', port)
+    words = (
+        'endpoint --connection udpin:127.0.0.1:9 --system 7 --vehicle bluerov2 --eta 1 2 3 4 5 6 '
+        '--thrusters measured --voltage 14 --gain 0.7 --mode ALT_HOLD --firmware 4.2 '
+        '--position-after 3 --ready-after 2 --velocity-bias 0.1 0.2 0.3'
+    )
+    monkeypatch.setattr('sys.argv', shlex.split(words))
+    with pytest.raises(MadeError):
+        ardusub_endpoint.main()
+    assert port.call_args.args[:2] == ('udpin:127.0.0.1:9', 7)
+    assert made.call_args.args[0] == Settings(
+        vehicle='bluerov2', eta=(1, 2, 3, 4, 5, 6), curve='measured', voltage=14, gain=0.7,
+        mode=ALT_HOLD, version=(4, 2, 0), position_after=3, ready_after=2,
+        velocity_bias=(0.1, 0.2, 0.3),
+    )  # fmt: skip

@@ -6,17 +6,25 @@ import time
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
+from unittest.mock import Mock
 
+import driver as driver_module
 import numpy as np
 import pytest
+from driver import COMPONENT, Driver
 from helpers.mavlink_relay import Relay, fork_program, free_port, start_program
 from helpers.node_processes import PATIENCE, Peer, fresh_domain, parameters, stop
+from helpers.nodes_in_process import program
 from helpers.patience import patience
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from std_srvs.srv import SetBool
+from udp import UdpPort
+from vehicle_link import LinkSettings
+from wrench_mapping import FOUR, MANUAL_CONTROL
 
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import convert, interface, topics
-from auv_dynamics.ros.interface import NANOSECONDS, Frames
+from auv_dynamics.ros.interface import NANOSECONDS, BadMessageError, Frames
 
 FRAMES = Frames()
 SOON = ('--position-after', '0.5', '--ready-after', '1')  # after boot, for a test
@@ -145,6 +153,14 @@ def test_a_push_ahead_goes_ahead_and_stamps_are_of_now(sea) -> None:
     assert np.abs(x[8:]).max() < 0.1
 
 
+def test_the_diagnostics_tell_the_vehicle(sea) -> None:
+    sea.until(sea.facts, 'diagnostics')
+    found = sea.facts()
+    assert found['firmware'] == 'ArduSub 4.5.0'
+    assert (found['mode'], found['armed'], found['commanded']) == ('19', 'True', 'True')
+    assert (found['battery (V)'], found['pilot gain']) == ('16.0', '1.0')
+
+
 def test_a_wrench_that_falls_silent_is_let_go_and_taken_up_again(sea) -> None:
     sea.tau = None
     sea.until(lambda: sea.facts().get('armed') == 'False', 'a disarmed vehicle')
@@ -233,3 +249,51 @@ def test_a_signal_leaves_the_vehicle_disarmed_its_inputs_neutral(start, number) 
         assert 'waits for' in output, 'what it waited for stands in the log'
     finally:
         sea.close()
+
+
+GIVEN = {
+    'vehicle': 'bluerov2', 'supply_voltage': 14.0, 'command': MANUAL_CONTROL, 'rate': 20.0,
+    'vehicle_system': 7, 'system': 254,
+    'link_timeout': 2.0, 'wrench_timeout': 0.25, 'disarm_timeout': 4.0,
+}  # fmt: skip
+TIMES = (2 * NANOSECONDS, MANUAL_CONTROL, NANOSECONDS // 4, 4 * NANOSECONDS)
+
+
+def test_every_parameter_is_heard_and_nothing_is_armed_unasked(monkeypatch) -> None:
+    made = {name: Mock(wraps=getattr(driver_module, name))
+            for name in ('VehicleLink', 'WrenchMapping', 'UdpPort')}  # fmt: skip
+    for name, mock in made.items():
+        monkeypatch.setattr(driver_module, name, mock)
+    with program() as peer:
+        place = f'udpin:127.0.0.1:{free_port(peer.context.get_domain_id())}'
+        node = peer.add(Driver, {'connection': place, **GIVEN})
+        with pytest.raises(InputError, match='connection: expected a free UDP port'):
+            peer.add(Driver, {'connection': place})
+        first = {name: mock.call_args_list[0].args for name, mock in made.items()}
+        assert first['VehicleLink'][0] == LinkSettings(7, 254, 6, 20.0, *TIMES)
+        vehicle, *rest = first['WrenchMapping']
+        assert (vehicle.name, *rest) == ('bluerov2', FOUR, 14.0)
+        assert first['UdpPort'] == (place, 254, COMPONENT)
+        assert not node._link.pilot.wanted
+        node._link.gain, now = 0.5, node.get_clock().now().nanoseconds
+        strong = (1000.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        node._on_wrench(now, strong)
+        _, share = node._mapping.axes(np.array(strong), 0.5)
+        assert node.graph.facts['share of the wrench'] == pytest.approx(share, abs=5e-4)
+        with pytest.raises(BadMessageError, match='wrench: age'):
+            node._on_wrench(now + 2 * NANOSECONDS, strong)
+        node._link.differences += ['one', 'another']
+        node._report()
+        assert node.graph.facts['differs'] == 'one; another'
+
+
+@pytest.mark.parametrize('place', ['tcp:127.0.0.1:14550', 'udpin:14550', 'udpout:127.0.0.1:rov'])
+def test_what_is_no_connection_is_refused(place: str) -> None:
+    with pytest.raises(ValueError, match='expected udpin:HOST:PORT or udpout:HOST:PORT'):
+        UdpPort(place, 255, COMPONENT)
+
+
+def test_a_peer_that_cannot_be_reached_is_no_error() -> None:
+    port = UdpPort('udpout:255.255.255.255:9', 255, COMPONENT)  # broadcast, which is forbidden
+    port.send(mavlink.MAVLink_timesync_message(0, 0))
+    port.close()

@@ -56,12 +56,15 @@ def test_half_of_it_may_be_lost_on_the_way(way: str) -> None:
 
 def test_it_goes_on_until_the_motors_are_seen_at_rest() -> None:
     seen, unseen = Pair().flown(PUSH), Pair().flown(PUSH)
-    unseen.link._takers.pop('SERVO_OUTPUT_RAW')
+    motors = unseen.link._takers.pop('SERVO_OUTPUT_RAW')
     counts = []
     for pair in (seen, unseen):
         before = inputs(pair)
         pair.link.pilot.want(False, pair.now)
-        pair.run(3.0, tau=PUSH)
+        pair.run(0.5, tau=PUSH)
+        lights = mavlink.MAVLink_servo_output_raw_message(0, 1, *[1500] * 8)  # outputs 17 to 24
+        motors(lights, 0)
+        pair.run(2.5, tau=PUSH)
         counts.append(inputs(pair) - before)
     assert LEAST <= counts[0] < MOST
     assert counts[1] == MOST

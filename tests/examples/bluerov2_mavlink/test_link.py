@@ -176,6 +176,12 @@ def test_messages_of_others_are_dropped_and_counted() -> None:
     pair._downs.write(bytes(bad))
     pair.run(0.004)
     assert pair.link.refused == refused + 1
+    offset, other = pair.link.clock.local(0), 3000 * SECOND  # of another station's clock
+    for _ in range(40):
+        boot_time = pair.now - pair.booted
+        pair._downs.send(mavlink.MAVLink_timesync_message(boot_time, pair.now - other))
+        pair.run(0.004)
+    assert pair.link.clock.local(0) == offset
     pair.run(1.0)
     assert len(pair.samples) > before + 40
 

@@ -1,5 +1,7 @@
 """What the driver asks a vehicle for when they meet, what it waits for, what it says."""
 
+from types import SimpleNamespace
+
 import pytest
 from helpers.mavlink_pair import Booted, Pair
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -47,6 +49,11 @@ def test_everything_that_is_missing_is_named_at_once() -> None:
     pair.run(0.3, tau=[1.0, 0, 0, 0, 0, 0])
     assert waits(pair) == ['the vehicle to arm: PreArm: Gyros not calibrated']
     assert told(pair, 'vehicle: PreArm: Gyros not calibrated') == 1
+    assert told(pair, 'MAV_CMD_COMPONENT_ARM_DISARM: MAV_RESULT_FAILED') == 1
+    arming = mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_CRITICAL, b'Arm: Leak')
+    pair._downs.send(arming)
+    pair.run(0.004, tau=[1.0, 0, 0, 0, 0, 0])
+    assert waits(pair)[0].endswith('Arm: Leak')
     pair.run(2.5, tau=[1.0, 0, 0, 0, 0, 0])
     assert waits(pair) == []
     assert pair.autopilot.armed
@@ -104,6 +111,19 @@ def test_or_it_is_the_one_at_boot() -> None:
     assert (pair.link.gain, pair.link.gain_from) == (0.75, 'JS_GAIN_DEFAULT')
 
 
+def test_a_pilot_gain_that_cannot_be_is_refused_and_a_restart_wants_it_anew() -> None:
+    pair = Pair(Booted(gain=0.7), BY_STICK)
+    pair.run(1.0)
+    pair._downs.send(mavlink.MAVLink_named_value_float_message(0, b'PilotGain', 0.0))
+    pair.run(0.004)
+    assert told(pair, 'refused: PilotGain: expected a number from 0 to 1, found 0.0') == 1
+    assert pair.link.gain == pytest.approx(0.7)
+    pair.boot()
+    deaf(pair, 'REQUEST_DATA_STREAM', 'PARAM_REQUEST_READ').run(2.5)
+    assert told(pair, 'vehicle restarted') == 1
+    assert pair.link.gain is None
+
+
 @pytest.mark.parametrize('gain', [0.5, 0.1], ids=['not told', 'beyond its limits'])
 def test_without_either_it_waits_and_says_so(gain: float) -> None:
     silent = ['REQUEST_DATA_STREAM'] + ['PARAM_REQUEST_READ'] * (gain == 0.5)
@@ -113,6 +133,16 @@ def test_without_either_it_waits_and_says_so(gain: float) -> None:
     assert 'the pilot gain (PilotGain or JS_GAIN_DEFAULT)' in waits(pair)
     assert not [m for m in pair.sent if m.get_type() == 'MANUAL_CONTROL']
     assert told(pair, 'no answer about', 'JS_GAIN_DEFAULT') == (gain == 0.5)
+
+
+def test_an_old_firmware_is_said_and_a_trial_version_is_named() -> None:
+    pair = Pair(Booted(version=(3, 5, 4)))
+    pair.run(1.0)
+    assert told(pair, 'ArduSub 3.5.4 is older than 4.0: nobody has tried it') == 1
+    for kind, name in ((0, ' dev'), (64, ' alpha'), (128, ' beta'), (192, ' rc'), (255, '')):
+        sent = int.from_bytes((4, 5, 1, kind), 'big')
+        pair.link.profile.take_version(SimpleNamespace(flight_sw_version=sent))
+        assert pair.link.profile.firmware == f'ArduSub 4.5.1{name}'
 
 
 @pytest.mark.parametrize(

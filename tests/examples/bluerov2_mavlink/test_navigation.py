@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from helpers.mavlink_pair import SECOND, Pair
-from navigation import ENOUGH, BootClock, Exchange, RestartedError, turned
+from navigation import ENOUGH, BootClock, Exchange, Navigation, RestartedError, turned
 from numpy.testing import assert_allclose
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from auv_dynamics.vehicle.kinematics import attitude_rate, quaternion
 
@@ -72,6 +73,14 @@ def test_a_clock_that_stood_still_is_no_other_boot() -> None:
     for i in range(ENOUGH):
         clock.add(exchange(21_000 + 100 * i, 1.0, 1.0, offset=OFFSET + 300 * MS))
     assert clock.local(0) == OFFSET + 300 * MS
+
+
+def test_a_position_without_an_attitude_of_its_time_is_no_odometry() -> None:
+    navigation = Navigation(known())
+    navigation.attitude(mavlink.MAVLink_attitude_message(1000, *[0.0] * 6))
+    given = {ms: navigation.position(mavlink.MAVLink_local_position_ned_message(ms, *[0.0] * 6))
+             for ms in (1100, 1101)}  # fmt: skip
+    assert [sample is None for sample in given.values()] == [False, True]
 
 
 @pytest.mark.parametrize('seconds', [0.3, 1.5])

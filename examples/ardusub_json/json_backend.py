@@ -137,8 +137,6 @@ class Backend:
                 yield self._port.recvfrom(2048)
             except BlockingIOError:
                 return
-            except ConnectionError:  # the last answer found nobody
-                continue
 
     def _is_peer(self, address: Any) -> bool:
         before, now = self._heard, time.monotonic()

@@ -6,6 +6,8 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import json_backend
 import numpy as np
@@ -17,7 +19,8 @@ from helpers.sitl_peer import BACKEND, NEUTRAL, ROOT, SitlPeer, backend, direct
 from json_motors import make_motors
 
 from auv_dynamics import load_vehicle
-from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.errors import FailedError, InputError
+from auv_dynamics.vehicle.thruster_curves import load_curve
 
 UP = ('0', '0', '-1', '0', '0', '0')  # NED, rad
 PULSES = np.array([1600.0, 1350, 1480, 1700, 1450, 1550, 1300, 1900] + [0.0] * 24)
@@ -88,15 +91,34 @@ def test_it_says_once_that_nobody_is_there(monkeypatch, capsys) -> None:
         waits = json_backend.Backend(port, None, lambda: None, paced=True)
         waits.serve()
         waits.serve()
-    assert capsys.readouterr().err == 'no frame of ArduSub for 0.5 s: waiting\n'
+        assert capsys.readouterr().err == 'no frame of ArduSub for 0.5 s: waiting\n'
+        assert waits._is_peer(('127.0.0.1', 9))
+        waits.serve()
+    assert capsys.readouterr().err.endswith('no frame of ArduSub for 0.5 s: waiting\n'), 'again'
+
+
+def test_what_cannot_be_sent_is_said_and_what_fails_is_no_wrong_input(monkeypatch, capsys) -> None:
+    unreachable = Mock(side_effect=OSError(101, 'Network is unreachable'))
+    port = SimpleNamespace(sendto=unreachable)
+    json_backend.Backend(port, None, lambda: None, paced=True)._send(b'')
+    assert capsys.readouterr().err == 'None: network is unreachable\n'
+    monkeypatch.setattr(json_backend, 'serve', Mock(side_effect=FailedError('it broke')))
+    assert json_backend.main(['--vehicle', 'bluerov2']) == 1
+    assert capsys.readouterr().err == 'it broke\n'
+
+
+def test_it_listens_where_sitl_sends_unless_told_otherwise() -> None:
+    assert json_backend.options_of(['--vehicle', 'bluerov2']).listen == '127.0.0.1:9002'
 
 
 def test_a_length_in_simulated_time() -> None:
     with backend('--vehicle', 'bluerov2', '--seconds', '0.5') as process:
         peer = SitlPeer(process.port)
-        peer.run(0.5)
+        peer.run(0.25)
+        peer.count += 3
+        peer.run(0.25)
         assert process.ended() == 0
-    assert process.said[-1].startswith('0.500 s, 200 frames')
+    assert process.said[-1] == '0.500 s, 200 frames, 3 lost'
 
 
 def test_no_time_sync_is_told() -> None:
@@ -146,6 +168,29 @@ def test_a_full_pulse_gives_the_limits_of_the_vehicle_file() -> None:
     assert motors.thrusts(np.full(32, 1100.0)) == pytest.approx(-thrusters.reverse, rel=0.01)
     weak, _ = make_motors(thrusters, None, 12)
     assert weak.thrusts(np.full(32, 1900.0)) == pytest.approx(0.72 * thrusters.forward, rel=0.05)
+
+
+AT_18, AT_16 = load_curve('t200_18v'), load_curve('t200_16v')
+
+
+@pytest.mark.parametrize(
+    ('unit', 'commands', 'share'),
+    [
+        ('pwm_us', [1100, 1500, 1900], 0.5),
+        ('percent', [-100, 0, 100], AT_18.thrust(1700) / AT_16.thrusts[-1]),
+    ],
+)
+def test_the_curve_of_a_rotor_counts_where_it_is_of_pulses(
+    unit: str, commands: list, share: float, tmp_path: Path
+) -> None:
+    data = yaml.safe_load((ROOT / 'config' / 'vehicles' / 'bluerov2.yaml').read_text())
+    for one in data['thrusters']:
+        one |= {'limit': 20.0, 'rotor': {'curve': {unit: commands, 'thrust_n': [-20, 0, 20]}}}
+    path = tmp_path / 'mine.yaml'
+    path.write_text(yaml.safe_dump(data))
+    # at the battery's voltage where none is told; of another unit: a T200's, scaled to the limits
+    motors, _ = make_motors(load_vehicle(path).thrusters, None, 18)
+    assert motors.thrusts(np.full(32, 1700.0)) == pytest.approx(20.0 * share)
 
 
 def test_motors_by_the_option() -> None:

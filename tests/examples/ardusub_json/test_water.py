@@ -16,6 +16,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
 
 from auv_analysis import load_run
+from auv_dynamics.files.errors import FailedError
 from auv_dynamics.vehicle.thruster_curves import load_curve
 
 DEEP = ('0', '0', '20', '0.1', '-0.2', '1')  # NED, rad
@@ -263,19 +264,27 @@ def test_lost_commands_are_held_and_then_none(tmp_path: Path) -> None:
     assert (faster[2][80:] < 0).all()
 
 
+DOWN = motor_pulses([1500, 1500, 1400, 1500, 1500, 1500], 8)
+
+
 @pytest.mark.parametrize(
-    ('lags', 'power'), [({'lag': 0.02, 'rotor_lag': 0.0}, 1), ({'rotor_lag': 0.02}, 2)]
+    ('lags', 'share'),
+    [
+        ({'lag': 0.02, 'rotor_lag': 0.0}, 1 - np.exp(-1.0)),
+        ({'rotor_lag': 0.02}, (1 - np.exp(-1.0)) ** 2),
+        ({'rate': 100.0, 'rotor_lag': 0.0}, 100.0 * 0.02 / wrench('bluerov2_heavy', DOWN)[2]),
+    ],
 )
-def test_lags_are_those_of_the_scenario(lags: dict, power: int, tmp_path: Path) -> None:
-    down, felt = motor_pulses([1500, 1500, 1400, 1500, 1500, 1500], 8), []
+def test_lags_are_those_of_the_scenario(lags: dict, share: float, tmp_path: Path) -> None:
+    felt = []
     for spec in (lags, {'rotor_lag': 0.0}):
         actuators = {'thrusters': True, **spec}
         with direct('--scenario', scenario(tmp_path, actuators=actuators)) as peer:
             calm = peer.run(0.1)['accel_body'][-1, 2]
-            felt.append(peer.run(0.02, down)['accel_body'][:, 2] - calm)
+            felt.append(peer.run(0.02, DOWN)['accel_body'][:, 2] - calm)
     slow, quick = felt
     # 8 frames: 0.02 s; thrust goes by the square of a rotor's speed
-    assert slow[7] / quick[0] == pytest.approx((1 - np.exp(-1.0)) ** power, abs=0.03)
+    assert slow[7] / quick[0] == pytest.approx(share, abs=0.03)
 
 
 def test_rotors_of_the_vehicle_file_follow_late(peer: DirectPeer) -> None:
@@ -284,7 +293,14 @@ def test_rotors_of_the_vehicle_file_follow_late(peer: DirectPeer) -> None:
     assert felt[0] < 0.1 * felt[-1]
 
 
-def test_a_recording_is_a_run(tmp_path: Path) -> None:
+def test_a_vehicle_that_leaves_the_finite_numbers_is_a_failure(tmp_path: Path) -> None:
+    fast = {'nu': [500.0, 0, 0, 0, 0, 0]}
+    failed = pytest.raises(FailedError, match=r'the simulation diverges at 0\.0025 s')
+    with direct('--scenario', scenario(tmp_path, initial=fast)) as peer, failed:
+        peer.frame()
+
+
+def test_a_recording_is_a_run(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     fault = {'kind': 'thruster', 'thruster': 'T2', 'efficiency': 0.5, 'from': 0.5}
     spec = {
         'faults': [fault],
@@ -296,6 +312,9 @@ def test_a_recording_is_a_run(tmp_path: Path) -> None:
         peer.run(0.2)
         peer.count = 0
         told = peer.run(1.0, TURNING)
+    said = capsys.readouterr().err
+    assert 'reef.yaml: controllers, sensors, limits and delay left out' in said
+    assert 'FRAME_CONFIG 2; motors 1 to 8: T1, T2' in said
     assert len(load_run(bag).t) == 20
     run = load_run(tmp_path / 'dive_2')
     assert (run.scenario, len(run.t)) == ('reef', 100)

@@ -74,6 +74,7 @@ actuators = {delay: 0.0123} | actuators.delay | multiple of step | 0.0123
 actuators = {lag: -1} | actuators.lag | from 0 up | -1
 actuators = {thrusters: true} | actuators.thrusters | a vehicle with thrusters | true
 actuators = {} | actuators | a mapping with limit | {}
+sensors = {} | sensors | a mapping with velocity_noise | {}
 sensors = {drop_out: 1.1} | sensors.drop_out | from 0 to 1 | 1.1
 sensors = {velocity_noise: 11} | sensors.velocity_noise | from 0 to 10 | 11
 sensors = {velocity_noise: [1, 2]} | sensors.velocity_noise | 6 numbers | 2 numbers

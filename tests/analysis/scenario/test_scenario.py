@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from auv_analysis import load_scenario
 from auv_analysis.scenario.scenario import Scenario, write_inputs
 from auv_analysis.studies.sweep import campaign
 from auv_dynamics import load_vehicle
+from auv_dynamics.files import yaml_files
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.plant.parameters import SCHEMA
@@ -199,12 +201,68 @@ def test_shipped_file_loads_by_its_bare_name(path: Path) -> None:
     assert shipped(path.parent.name, path.stem).samefile(path)
 
 
+POWER = re.compile(r'(\d+)\^(\d+)(?: - (1))?')  # such as 2^63 - 1
+RANGES = {  # in a title: what it says of a number
+    r'positive()': ('exclusiveMinimum',),
+    r'from (-?\d+) to (-?\d+)': ('minimum', 'maximum'),
+    r'from (-?\d+) up': ('minimum',),
+    r'above (-?\d+)': ('exclusiveMinimum',),
+    r'up to (-?\d+)': ('maximum',),
+}
+SIZES = {  # and of a text, a list, a mapping
+    'string': {r'at most (\d+) characters': ('maxLength',)},
+    'array': {
+        r'^(\d+) numbers': ('minItems', 'maxItems'),
+        r', at most (\d+)$': ('maxItems',),
+        r'list of at least (one)': ('minItems',),
+    },
+    'object': {r'mapping of at least (one)': ('minProperties',)},
+}
+
+
+def said(title: str, patterns: dict[str, tuple[str, ...]]) -> dict[str, int]:
+    """Keys of a schema, with the numbers that a title has in words."""
+    words = POWER.sub(lambda m: str(int(m[1]) ** int(m[2]) - int(m[3] or 0)), title)
+    found: dict[str, int] = {}
+    for pattern, keys in patterns.items():
+        if match := re.search(pattern, words):
+            numbers = [int(word.replace('one', '1') or 0) for word in match.groups()]
+            found |= dict(zip(keys, numbers * 2, strict=False))
+    return found
+
+
+def contradictions(node: Any, title: str = '') -> Iterator[str]:
+    """Titles, of a node or of one that it is in, whose words are not what is checked."""
+    if isinstance(node, list):
+        for entry in node:
+            yield from contradictions(entry, title)
+    if not isinstance(node, dict):
+        return
+    title = node['title'] if isinstance(node.get('title'), str) else title
+    kind = node.get('type')
+    if kind in ('number', 'integer'):
+        there = {key: node[key] for keys in RANGES.values() for key in keys if key in node}
+        if there != said(title, RANGES):
+            yield title
+    sizes = said(title, SIZES.get(kind, {})) if isinstance(kind, str) and 'title' in node else {}
+    if not sizes.items() <= node.items():
+        yield title
+    if 'enum' in node and sorted(re.findall(r'[\w-]+', title)) != sorted(
+        [*map(str, node['enum']), 'or']
+    ):
+        yield title
+    for key, entry in node.items():
+        if key not in ('title', 'description', 'default', 'examples', 'enum', 'const'):
+            yield from contradictions(entry, title)
+
+
 @pytest.mark.parametrize('kind', SCHEMAS)
 def test_schema_is_one_and_says_what_is_expected_everywhere(kind: str) -> None:
     schema = json.loads(SCHEMAS[kind].read_text(encoding='utf-8'))
     jsonschema.Draft202012Validator.check_schema(schema)
     for name, entry in schema['properties'].items():
         assert entry.get('title'), name
+    assert list(contradictions(yaml_files.schema(SCHEMAS[kind]))) == []
 
 
 def test_initial_angles_in_degrees_are_warned_of() -> None:

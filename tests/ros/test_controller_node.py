@@ -288,7 +288,7 @@ def test_lifecycle_gains_are_taken_while_inactive_only() -> None:
 
 def test_limits_and_timeouts_are_taken_while_inactive_only() -> None:
     with program() as peer:
-        peer.add(ControllerNode, [*LOCKSTEP, *parameters(autostart=False)])
+        node = peer.add(ControllerNode, [*LOCKSTEP, *parameters(autostart=False)])
         peer.listen(topics.WRENCH)
         assert change(peer, Transition.TRANSITION_CONFIGURE)
         five = ParameterValue(type=8, double_array_value=[5.0])
@@ -315,6 +315,7 @@ def test_limits_and_timeouts_are_taken_while_inactive_only() -> None:
         peer.publish(topics.CMD_VEL, setpoint(0))
         peer.publish(topics.ODOM, odometry(0))
         assert answered(peer, 1)[0].wrench.force.x == 5.0
+        assert [*node.graph.refused] == ['cmd_vel: twist.linear']
 
 
 def test_a_transition_that_does_not_exist_is_refused() -> None:

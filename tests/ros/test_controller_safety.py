@@ -325,6 +325,10 @@ def test_the_whole_life_of_the_controller(driver: Driver) -> None:
     assert change(peer, Transition.TRANSITION_ACTIVE_SHUTDOWN)
     assert state(peer) == 'finalized'
     peer.until(lambda: driver.surge[-1] == 0.0, 'a zero wrench')
+    count = len(driver.surge)
+    for _ in range(20):
+        driver.step()
+    assert len(driver.surge) == count
 
 
 def test_a_change_of_law_and_gains_is_no_bump(slow: Driver) -> None:

@@ -10,6 +10,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from helpers.node_processes import PATIENCE, Peer, fresh_domain
 from rclpy.context import Context
 from rclpy.node import Node
+from rclpy.task import Future
+from std_srvs.srv import SetBool
 
 from auv_dynamics.files.errors import InputError, on_signals
 from auv_dynamics.ros import topics
@@ -74,6 +76,13 @@ def test_who_says_how_it_is_lives(graph: Watcher, peer: Peer) -> None:
     said = DiagnosticArray(status=[DiagnosticStatus(name='/plant_node')])
     peer.publish(topics.DIAGNOSTICS, said)
     until(graph, lambda: graph.alive == {'plant_node'})
+
+
+def test_what_the_plant_waits_for_is_told(graph: Watcher) -> None:
+    graph._asked = Future()
+    graph._asked.set_result(SetBool.Response(success=False, message='analysis_node'))
+    assert not graph.ask_to_run()
+    assert graph.waits_for == 'analysis_node to be ready'
 
 
 def interrupted(inner: Callable[..., Any], ended: list[str]) -> Callable[..., Any]:

@@ -20,6 +20,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from auv_dynamics.nodes import plant_node
 from auv_dynamics.nodes.plant_node import MET, PlantNode
+from auv_dynamics.plant.faults import END, Fault, Losses
 from auv_dynamics.ros import topics
 
 H, STEP = 0.02, 20_000_000
@@ -343,7 +344,7 @@ def test_a_long_step_is_not_late(made, hours, capfd) -> None:
     assert ' s late' not in capfd.readouterr().err
 
 
-def test_a_wrench_is_of_a_step_up_to_a_second_ahead_and_ends_a_silence(made, hours) -> None:
+def test_a_wrench_is_of_a_step_up_to_a_second_ahead_and_ends_a_silence(made, hours, capfd) -> None:
     plant = begun(made, hours)
     made.listen(topics.DIAGNOSTICS)
     told = made.heard['/diagnostics']
@@ -354,12 +355,14 @@ def test_a_wrench_is_of_a_step_up_to_a_second_ahead_and_ends_a_silence(made, hou
         made.publish(topics.WRENCH, by_hand.six(topics.WRENCH.type, k * STEP, TAU[0]))
         made.spin(3 * H)
 
-    for k in (0, 0, 51):  # step 1 is the next one
+    for k in (0, 0, 51, 1):  # step 1 is the next one: one that is ahead locks out none but older
         say(k)
     assert plant.graph.refused.total() == 0
     made.until(lambda: told[-1].status[0].level == DiagnosticStatus.OK, 'no silence')
+    say(0)
+    assert 'wrench: stamp: expected newer than the last, found 0 ns' in capfd.readouterr().err
     say(52)
-    assert plant.graph.refused.total() == 1
+    assert plant.graph.refused.total() == 2
     hours.go_on(0.51)
     made.until(lambda: told[-1].status[0].level == silent, 'silence again')
 
@@ -408,3 +411,18 @@ def test_a_plant_that_diverges_in_real_time_says_after_which_step(made, hours, c
     said = capfd.readouterr().err
     assert said.count('diverges') == 1
     assert 'after step 1:' in said
+
+
+def test_the_seed_says_what_is_lost_at_random(made, vehicle) -> None:
+    spec = {'kind': 'wrench_loss', 'probability': 0.5}
+    given = {f'faults.mute.{key}': value for key, value in spec.items()}
+    node = made.add(
+        PlantNode,
+        {**PARAMETERS, 'vehicle': str(vehicle), 'seed': 3, 'faults.names': ['mute'], **given},
+    )
+    lost = []
+    for _ in range(40):
+        lost.append(node.plant.deaf)
+        node.plant.answer((0.0,) * 6)
+        node.plant.advance()
+    assert lost == Losses(Fault(spec, 0, END, 0), 3).rows(np.arange(40)).tolist()

@@ -309,27 +309,6 @@ def test_a_reset_in_real_time_puts_the_vehicle_back_at_once(peer) -> None:
 REAL = [*parameters(vehicle='herman2018_neutral'), '-p', 'expected_subscribers:=["odom=1"]']
 
 
-def test_a_wrench_that_is_stamped_ahead_locks_out_none_but_older_ones(capfd) -> None:
-    with graph(('plant_node', REAL)) as (peer, _):
-        listening(peer)
-
-        def pushed() -> float:
-            newest = step_of(odometry(peer, 1)[-1])
-            peer.publish(topics.WRENCH, wrench(newest + 50, (0.0,) * 6))
-            peer.publish(topics.WRENCH, wrench(10**9, (-1e3, 0, 0, 0, 0, 0)))
-            peer.spin(0.02)
-            peer.publish(topics.WRENCH, wrench(newest + 10, (300.0, 0, 0, 0, 0, 0)))
-            peer.spin(0.05)
-            return peer.heard['odom'][-1].twist.twist.linear.x
-
-        peer.until(lambda: pushed() > 0.05, 'motion forward')
-        for _ in range(25):  # complaints of a kind come seldom, and this is not the first
-            peer.publish(topics.WRENCH, wrench(3, (0.0,) * 6))
-            peer.spin(0.1)
-    said = capfd.readouterr().out
-    assert 'wrench: stamp: expected newer than the last, found 30000000 ns' in said
-
-
 def test_a_short_pause_in_real_time_is_made_up_for() -> None:
     """Else its stamps stay behind, and a controller with a clock of its own takes them for old."""
     with graph(('plant_node', REAL)) as (peer, processes):

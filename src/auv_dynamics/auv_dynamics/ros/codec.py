@@ -26,6 +26,7 @@ STAMP = 'iI'  # Time: seconds and nanoseconds
 FIRST_FIELD = 4  # bytes of the CDR encapsulation come before it
 MARK_NS = 305419896 * NANOSECONDS + 180150000
 PROBES = (0.1, -7e300)  # numbers that a template is tried with
+UNUSED = 16  # bytes: fewer than these behind the last number are the middleware's, for no field
 
 
 class Kind(NamedTuple):
@@ -105,7 +106,9 @@ class Layout:
         back = sorted(range(kind.size), key=wire.__getitem__)
         self._to_wire, self._from_wire = _permutation(wire), _permutation(back)
         self._runs = _runs([places[i] for i in wire], order)
-        self._length, self._buffer = len(data), bytearray(data)
+        end = max(places, default=len(data)) + 8
+        self._length = len(data)
+        self._buffer = bytearray(data[:end] if len(data) - end < UNUSED else data)
         self._fixed = [(0, data[:2])]  # the encoding
         for text in {frames.odom, frames.base, *kind.words}:
             encoded = struct.pack(f'{order}I', len(text.encode()) + 1) + text.encode() + b'\0'

@@ -36,10 +36,12 @@ def fresh_domain() -> int:
     """Domain id of its own for each test, apart from those of parallel workers."""
     worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])
     share = 100 // int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1'))
-    while True:
+    limit = time.monotonic() + PATIENCE
+    while time.monotonic() < limit:
         domain = 1 + worker * share + (os.getpid() + next(_domains)) % share
         if is_free(domain):  # `auv` picks its own from all of them
             return domain
+    raise RuntimeError(f'none of the {share} domains of this worker is free')
 
 
 def environment(domain: int) -> dict[str, str]:

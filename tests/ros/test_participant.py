@@ -38,6 +38,7 @@ def domain(monkeypatch) -> int:
 def graph(domain: int) -> Iterator[Watcher]:
     made = Watcher(domain)
     yield made
+    Node.destroy_node(made._node)  # else it is in the domain until Python looks for garbage
     made._context.try_shutdown()
 
 

@@ -5,8 +5,10 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
+from helpers.patience import patience
+
 PAUSE = 0.25  # s: watchdogs of half a second have then been called by the machine
-TRIES = 3
+TRIES = round(patience(3.0))  # the busier the machine, the more
 Found = TypeVar('Found')
 
 

@@ -93,7 +93,9 @@ def messages(
     met: Counter[str] = Counter()
 
     def taken(topic: str) -> bool:
-        share = (shares or {}).get(topic, 1.0)
+        if shares is None:
+            return True
+        share = shares.get(topic, 1.0)
         met[topic] += 1
         return math.ceil(met[topic] * share) > math.ceil((met[topic] - 1) * share)
 

@@ -1,6 +1,7 @@
 """What a recording contradicts itself in: axes, rates, delays, a wrench that is not there."""
 
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -322,12 +323,13 @@ def _least(
     wide : half of the parabola, in `COARSE`
 
     """
-    found: dict[int, np.ndarray] = {}
+
+    @cache
+    def at(k: int) -> np.ndarray:
+        return left(first + k * FINE)
 
     def total(k: int) -> float:
-        if k not in found:
-            found[k] = left(first + k * FINE)
-        return float(found[k].sum())
+        return float(at(k).sum())
 
     last = round((FARTHEST - first) / FINE)
     near = min(range(0, last + 1, COARSE), key=total)
@@ -336,8 +338,7 @@ def _least(
     if not half:
         return None, total(k)
     around = COARSE * np.arange(-half, half + 1)
-    every = [left(first + (k + j) * FINE) for j in around.tolist()]
-    _, slope, curve = polyfit(FINE * around, every, 2)
+    _, slope, curve = polyfit(FINE * around, [at(k + j) for j in around.tolist()], 2)
     curvature = 2.0 * float(curve.sum())
     if curvature <= 0.0:
         return None, total(k)

@@ -15,7 +15,22 @@ from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 from auv_gvc_controller.laws.model import control_model, decompose
 
+
+def in_sname(file):
+    """The same vehicle with the derivatives of SNAME, which have the other sign."""
+    data = copy.deepcopy(file) | {'sign': 'sname'}
+    for inner, key in (
+        (data, 'added_mass'),
+        (data, 'lift'),
+        *((data['damping'], k) for k in KINDS),
+    ):
+        inner[key] = (-np.array(inner[key])).tolist()
+    return data
+
+
+KINDS = ('linear', 'quadratic')
 FILES = {name: file_of(name) for name in ('rexrov', 'herman2018', 'lauv', 'lrauv_tethys')}
+FILES['sname'] = in_sname(FILES['lauv'])
 PLACES = {
     'rexrov': [
         ('rigid_body', 'mass'), ('rigid_body', 'center_of_gravity', 1),
@@ -28,6 +43,8 @@ PLACES = {
     'herman2018': [('rigid_body', 'mass'), ('inertia_matrix', 0, 0), ('inertia_matrix', 5, 5)],
     'lauv': [('rigid_body', 'mass'), ('added_mass', 1, 1), ('damping', 'linear', 1, 1),
              ('lift', 1, 5)],
+    'sname': [('added_mass', 1, 1), ('damping', 'linear', 1, 1), ('damping', 'quadratic', 1, 1),
+              ('lift', 1, 5)],
     'lrauv_tethys': [('added_mass', 2), ('damping', 'quadratic', 4), ('rigid_body', 'mass')],
 }  # fmt: skip
 
@@ -115,6 +132,44 @@ def test_units_are_judged_as_in_a_file(key):
     assert good.tolist() == [one is not None for one in files] == [True, False, False]
 
 
+def lopsided(*diagonal, above, below=0.0):
+    A = np.diag(diagonal).astype(float)
+    A[0, 1], A[1, 0] = above, below
+    return A
+
+
+TURNING = lopsided(*[100.0] * 6, above=300.0, below=-300.0)  # it dissipates what it does alone
+
+
+@pytest.mark.parametrize(
+    ('name', 'keys', 'good', 'bad'),
+    [
+        (
+            'rexrov',
+            ('rigid_body', 'inertia'),
+            lopsided(400, 500, 600, above=0.1),
+            lopsided(400, 500, 600, above=50.0),
+        ),
+        ('rexrov', ('rigid_body', 'inertia'), np.diag([400, 500, 600]), np.diag([0, 500, 500])),
+        (
+            'rexrov',
+            ('added_mass',),
+            lopsided(*[800] * 6, above=0.1),
+            lopsided(*[800] * 6, above=50.0),
+        ),
+        ('herman2018', ('inertia_matrix', 0, 1), 0.1, 50.0),
+        ('rexrov', ('damping', 'linear'), TURNING, -TURNING),
+    ],
+)
+def test_matrices_are_judged_and_made_symmetric_as_in_a_file(name, keys, good, bad):
+    file, columns = FILES[name], {keys: np.array([good, bad])}
+    found, accepted = fleet(file, columns, vehicle_from_dict(file, 'file'), 2)
+    expected = [vehicle_or_refusal(changed(file, columns, i))[0] for i in range(2)]
+    assert accepted.tolist() == [one is not None for one in expected] == [True, False]
+    assert_array_equal(found.M[0], expected[0].M)
+    assert_array_equal(found.D_linear[0], expected[0].D_linear)
+
+
 def test_whole_entries():
     file = FILES['rexrov']
     generator = np.random.default_rng(0)
@@ -134,6 +189,7 @@ def test_a_single_change_is_made_after_that_of_the_whole():
     columns = {('k', 1): np.array([7.0, 8.0]), ('k',): np.array([[1.0, 2.0], [3.0, 4.0]])}
     assert_array_equal(numbers([0.0, 0.0], columns, ('k',), 2), [[1, 7], [3, 8]])
     assert_array_equal(numbers([5.0, 6.0], {}, ('k',), 2), [[5, 6]])
+    assert_array_equal(columns['k',], [[1, 2], [3, 4]])
 
 
 def test_matrices_of_numbers_diagonals_and_matrices():

@@ -20,6 +20,7 @@ from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.simulation.reduction import COLUMNS
 from auv_analysis.simulation.rollouts import rollouts
 from auv_analysis.simulation.simulate import DivergedError
+from auv_analysis.simulation.variants import in_columns, packed_variants, within
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.kernel.compile import JITTED
 from auv_dynamics.vehicle import DOFS
@@ -165,15 +166,24 @@ def test_rollouts_with_tables_of_their_own_are_more_than_a_table_holds():
     same_as_alone(scenario, 'gvc', changes, 'zoh', columns, (0, 17, 20), seeds)
 
 
-LIMITED = {'limit': 60.0, 'delay': 0.0}
+PUSHED = {'disturbance': [{'kind': 'model_error', 'dD': 1.0}]}
+LIMITED, PRINTED = {'limit': 60.0, 'delay': 0.0}, {'kind': 'herman2018', 'scale': 2.0}
 
 
 @pytest.mark.parametrize(
     ('path', 'values', 'hold', 'base'),
     [
         ('disturbance[0].sway.offset', [0.0, 25.0, 80.0], 'continuous', {'disturbance': ROUGH[:1]}),
+        ('disturbance[0].dD', [1.0, 300.0], 'continuous', PUSHED),
+        ('disturbance[0].scale', [1.0, 3.0], 'continuous', {'disturbance': [PRINTED]}),
+        (
+            'disturbance[2].velocity',
+            [[0.3, 0.1, 0.0], [-0.1, 0.2, 0.4]],
+            'continuous',
+            {'disturbance': ROUGH},
+        ),
         ('actuators.delay', [0.0, 0.02, 0.05], 'zoh', {'actuators': LIMITED}),
-        ('controllers.gvc.anti_windup', [True, False], 'zoh', {'actuators': LIMITED}),
+        ('controllers.gvc.anti_windup', [False, True], 'zoh', {'actuators': LIMITED}),
     ],
 )
 def test_rollouts_over_what_is_no_column_of_numbers(path, values, hold, base):
@@ -192,11 +202,40 @@ def test_each_rollout_has_the_settling_band_of_its_own_set_point():
     times = columns['velocity_error.settling_time.surge']
     assert np.isfinite(times).all()
     assert times[0] != times[1]
+    apart = {'setpoint.surge': [moderate['surge'] | {'offset': x} for x in (0.1, 3.0, 0.1)]}
+    equal(rollouts(scenario, 'gvc', apart), {name: c[[0, 1, 0]] for name, c in columns.items()})
+
+
+def test_the_peak_of_a_set_point_is_that_of_all_samples(monkeypatch):
+    monkeypatch.setattr(module, 'BLOCK', 10)
+    growing = {'surge': wave(0.0, -1.0, 0.5), 'yaw': wave(0.3, 0.1, 20.0)}
+    scenario = scenario_of('gvc', duration=0.2, setpoint=growing)
+    nu_d = scenario.setpoint.value(np.arange(21) * 0.01)
+    expected = np.abs(nu_d).max(axis=0)
+    assert expected[0] == -nu_d[-1, 0]
+    assert_array_equal(module._peak(scenario.setpoint, scenario), expected)
 
 
 def equal(one, other):
     for name, column in one.items():
         assert_array_equal(column, other[name], err_msg=name)
+
+
+@pytest.mark.parametrize(
+    'drawn',
+    [{'sensors': NOISY}, {'faults': [{'kind': 'wrench_loss', 'probability': 0.5}]}],
+)
+def test_what_is_drawn_is_that_of_the_seed_wherever_it_stands(drawn):
+    errors = [{'kind': 'model_error', 'damping': -0.6}, ROUGH[1]]
+    scenario = scenario_of('gvc', duration=0.1, disturbance=errors, seed=3, **drawn)
+    changes = {'disturbance[1].damping': np.array([-0.4, 0.1])}  # without any, by a file alone
+    for seeds in (None, np.array([0, 6])):
+        columns = rollouts(scenario, 'gvc', changes, seeds=seeds, hold='zoh')
+        same_as_alone(scenario, 'gvc', changes, 'zoh', columns, range(2), seeds)
+    columns = rollouts(scenario, 'gvc', {'seed': [5.0, 6.0]}, hold='zoh')  # whole, like 6e0
+    same_as_alone(scenario, 'gvc', {'seed': [5, 6]}, 'zoh', columns, range(2))
+    columns = rollouts(scenario, 'gvc', {}, seeds=np.array([5, 6]), hold='zoh')
+    same_as_alone(scenario, 'gvc', {'seed': [5, 6]}, 'zoh', columns, range(2))
 
 
 GVC = scenario_of('gvc', 'herman2018', duration=0.3)
@@ -219,7 +258,7 @@ def test_no_rollout_depends_on_those_beside_it(rows, threads):
 
 
 def test_columns_and_scenarios_of_their_own_give_the_same_bits(monkeypatch):
-    scenario = scenario_of('gvc', duration=0.1, disturbance=ROUGH[:2])
+    scenario = scenario_of('gvc', duration=0.1, disturbance=ROUGH)
     generator = np.random.default_rng(5)
     count = 9
     changes = {
@@ -252,12 +291,60 @@ def test_values_that_are_no_numbers():
 
 def test_set_points_durations_and_steps_of_their_own():
     changes = {
-        'setpoint.surge.offset': [0.1, 0.2, 0.2, 0.5],
-        'duration': [0.1, 0.2, 0.1, 0.1],
-        'integrator': ['rk4', 'ode5', 'rk4', 'euler'],
+        'setpoint.surge.offset': [0.1, 0.2, 0.2, 0.5, 0.3],
+        'duration': [0.1, 0.2, 0.1, 0.1, 0.2],
+        'step': [0.01, 0.01, 0.01, 0.01, 0.02],
+        'integrator': ['rk4', 'ode5', 'rk4', 'euler', 'rk4'],
     }
     columns = rollouts(GVC, 'gvc', changes)
-    same_as_alone(GVC, 'gvc', changes, 'continuous', columns, range(4))
+    same_as_alone(GVC, 'gvc', changes, 'continuous', columns, range(5))
+
+
+TERMS = SIX['sway']['terms']
+LOST = {'kind': 'wrench_loss', 'from': 0.05}
+SLOW, FREE = {'lag': 0.05}, {'law': 'gvc', **LAWS['gvc'], 'anti_windup': False}
+
+
+@pytest.mark.parametrize(
+    ('changes', 'hold', 'base'),
+    [
+        ({'duration': [0.1, 0.2]}, 'continuous', {}),
+        ({'controllers.gvc.law': ['gvc', 'cl']}, 'continuous', {}),
+        ({'disturbance': [[], ROUGH[1:2]]}, 'continuous', {}),
+        ({'disturbance': [ROUGH[1:2], ROUGH[1:]]}, 'continuous', {}),
+        (
+            {'setpoint.sway.terms': [TERMS, TERMS * 2], 'setpoint.surge.offset': [0.1, 0.4]},
+            'continuous',
+            {},
+        ),
+        ({'actuators': [SLOW, SLOW | {'limit': 60.0}]}, 'zoh', {'controllers': {'gvc': FREE}}),
+        ({'faults': [[], [LOST]]}, 'zoh', {}),
+        ({'faults': [[LOST], [LOST | {'kind': 'sensor_drop_out'}]]}, 'zoh', {}),
+        (
+            {'vehicle': ['bluerov2', 'bluerov2_heavy']},
+            'zoh',
+            {'vehicle': 'bluerov2', 'actuators': {'thrusters': True}},
+        ),
+    ],
+)
+def test_rollouts_of_other_structures_run_apart(changes, hold, base):
+    scenario = scenario_of('gvc', duration=0.2, **base)
+    columns = rollouts(scenario, 'gvc', changes, hold=hold)
+    same_as_alone(scenario, 'gvc', changes, hold, columns, range(2))
+    assert columns['effort.rms.sway'][0] != columns['effort.rms.sway'][1]
+
+
+def test_rollouts_that_run_keep_what_is_theirs_beside_one_that_is_refused():
+    scenario = scenario_of('gvc', duration=0.1, sensors=NOISY)
+    changes = {
+        'setpoint.surge.offset': np.array([0.1, 0.2, 0.3, 0.4]),
+        'vehicle.rigid_body.mass': np.array([-1.0, 1800.0, 1850.0, 1900.0]),
+        'disturbance': [ROUGH[:1], ROUGH[:1], [], []],
+    }
+    seeds = np.array([5, 6, 7, 8])
+    columns = rollouts(scenario, 'gvc', changes, seeds=seeds, hold='zoh')
+    assert columns['status'].tolist() == ['refused', 'ok', 'ok', 'ok']
+    same_as_alone(scenario, 'gvc', changes, 'zoh', columns, (1, 2, 3), seeds)
 
 
 def test_what_makes_no_scenario_is_refused_and_the_rest_runs():
@@ -282,6 +369,85 @@ def test_what_makes_no_scenario_is_refused_and_the_rest_runs():
     same_as_alone(scenario, 'gvc', changes, 'continuous', columns, [0])
 
 
+LATE = {'actuators': {'limit': 60.0}, 'sensors': NOISY}
+M_RB = load_scenario('case1_rexrov').vehicle.M_RB
+WEIGHTLESS = {'kind': 'model_error', 'dM': (-M_RB).tolist()}  # but for its added mass
+LEFT = {'disturbance': [{'kind': 'model_error', 'damping': -0.6, 'mass': -0.5}, ROUGH[1]]}
+
+
+@pytest.mark.parametrize(
+    ('changes', 'base', 'key'),
+    [
+        ({'vehicle': [1.0]}, {}, 'vehicle'),
+        ({'seed': [-1]}, LATE, 'seed'),
+        ({'seed': [1.5]}, LATE, 'seed'),
+        ({'seed': np.array([1 << 63], np.uint64)}, LATE, 'seed'),
+        ({'controllers.gvc.k_D': [[1.0, 2.0]]}, {}, 'k_D'),
+        ({'controllers.gvc.k_D': [[1, 1, 1, 1, 1, 1e150]]}, {}, 'k_D'),
+        ({'controllers.gvc.anti_windup': [1]}, {'controllers': {'gvc': FREE}}, 'anti_windup'),
+        ({'vehicle.environment.gravity': [0.0]}, {}, 'gravity'),
+        ({'setpoint.surge.offset': [[0.1, 0.2]]}, {}, 'setpoint.surge.offset'),
+        (
+            {'setpoint.surge': [{'terms': []}], 'setpoint.surge.terms[0].phase': [0.1]},
+            {},
+            'setpoint.surge.terms[0]',
+        ),
+        ({'disturbance[0].mass': [0.1]}, {'vehicle': 'herman2018', **PUSHED}, 'mass'),
+        ({'disturbance[0].mass': [[0.1] * 6]}, PUSHED, 'mass'),
+        ({'disturbance[1].damping': [-0.5]}, LEFT, 'damping'),
+        ({'disturbance[1].mass': [-0.5]}, LEFT, 'mass'),
+        ({'disturbance[0].added_mass': [-1.0]}, {'disturbance': [WEIGHTLESS]}, 'disturbance[0]'),
+        ({'disturbance[0].mass': [-0.5]}, {'disturbance': [WEIGHTLESS]}, 'disturbance[0]'),
+        (
+            {'vehicle.thrusters[0].direction': [[0.0, 0.0, 0.0]]},
+            {'vehicle': 'bluerov2'},
+            'thrusters[0].direction',
+        ),
+    ],
+)
+def test_a_value_that_a_file_may_not_have_is_refused(changes, base, key):
+    scenario = scenario_of('gvc', duration=0.1, **base)
+    columns = rollouts(scenario, 'gvc', changes, hold='zoh')
+    assert columns['status'].tolist() == ['refused']
+    assert key in columns['reason'][0]
+    with pytest.raises(InputError, match='found') as refused:
+        changed_scenario(scenario, {path: values[0] for path, values in changes.items()})
+    assert columns['reason'][0] in str(refused.value)
+
+
+def test_gains_that_a_law_refuses_are_known_row_by_row():
+    pid = {'law': 'pid', **LAWS['pid'], 'omega_f': 20.0}
+    scenario = scenario_of('pid', controllers={'pid': pid, 'other': pid})
+    cut_off, rows = np.array([20.0, -1.0, 30.0]), np.arange(3)
+    columns = {'controllers.pid.omega_f': cut_off}
+    _, good = packed_variants(scenario, 'pid', columns, rows, rows)
+    assert good.tolist() == [True, False, True]
+    assert not in_columns(scenario, 'pid', 'controllers.other.omega_f', cut_off)
+
+
+def test_numbers_within_what_is_replaced_are_refused_where_there_is_no_place_for_them(tmp_path):
+    table = tmp_path / 'way.csv'
+    table.write_text('t,surge,sway,heave,roll,pitch,yaw\n0,0,0,0,0,0,0\n9,1,0,0,0,0,0\n')
+    scenario = scenario_of('gvc', duration=0.1, disturbance=ROUGH[1:2])
+    others = [ROUGH[1:2], [], ROUGH[:1], ROUGH[1:2]]
+    changes = {
+        'disturbance': others,
+        'disturbance[0].mass': [0.1, 0.1, 0.1, 0.2],
+        'setpoint': [SIX, SIX, SIX, {'file': str(table)}],
+        'setpoint.surge.offset': [0.1, 0.1, 0.1, 0.1],
+    }
+    columns = rollouts(scenario, 'gvc', changes)
+    assert columns['status'].tolist() == ['ok', *['refused'] * 3]
+    same_as_alone(scenario, 'gvc', changes, 'continuous', columns, [0])
+
+
+def test_what_lies_within_the_bounds_of_the_schema():
+    sensed = scenario_of('gvc', sensors=NOISY)
+    shares = np.array([-0.5, 0.0, 0.5, 1.0, 1.5])
+    assert within(sensed, 'sensors.drop_out', shares).tolist() == [False, True, True, True, False]
+    assert not within(sensed, 'seed', shares).any(), 'a whole number is more than bounds'
+
+
 def test_all_refused():
     columns = rollouts(GVC, 'gvc', {'vehicle.inertia_matrix[0][0]': [-1.0, 0.0, -5.0]})
     assert set(columns['status']) == {'refused'}
@@ -289,14 +455,16 @@ def test_all_refused():
 
 def test_a_rollout_that_diverges_says_when_and_leaves_the_others_alone():
     scenario = scenario_of('gvc', 'herman2018', duration=0.5)
-    gains = np.array([12.0, 12.0, 1e7, 12.0])
+    gains = np.array([12.0, 1e3, 1e7, 12.0])
     columns = rollouts(scenario, 'gvc', {'controllers.gvc.k_D': gains})
-    assert columns['status'].tolist() == ['ok', 'ok', 'diverged', 'ok']
-    with pytest.raises(DivergedError) as diverged:
-        simulate(changed_scenario(scenario, {'controllers.gvc.k_D': 1e7}), 'gvc')
-    assert f'{columns["reason"][2]}' in str(diverged.value)
-    assert columns['reason'][2] == f'not finite from t = {columns["diverged_at"][2]:g} s'
-    assert [name for name in COLUMNS if not np.isnan(columns[name][2])] == ['diverged_at']
+    assert columns['status'].tolist() == ['ok', 'diverged', 'diverged', 'ok']
+    for i in (1, 2):
+        with pytest.raises(DivergedError) as diverged:
+            simulate(changed_scenario(scenario, {'controllers.gvc.k_D': gains[i]}), 'gvc')
+        assert f'{columns["reason"][i]}' in str(diverged.value)
+        assert columns['reason'][i] == f'not finite from t = {columns["diverged_at"][i]:g} s'
+        assert [name for name in COLUMNS if not np.isnan(columns[name][i])] == ['diverged_at']
+    assert columns['diverged_at'][1] > columns['diverged_at'][2]
     assert columns['kinetic_energy.mean'][0] == columns['kinetic_energy.mean'][3]
 
 

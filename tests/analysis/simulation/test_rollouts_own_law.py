@@ -11,6 +11,7 @@ from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.simulation import batch
 from auv_analysis.simulation.batch import Kernel, kernels
 from auv_analysis.simulation.rollouts import rollouts
+from auv_analysis.simulation.variants import in_columns
 from auv_dynamics.kernel.compile import JITTED
 
 # all have the same name, which numba alone would not tell apart; types change nothing
@@ -102,6 +103,7 @@ def test_law_that_numba_fails_on_in_any_way_runs_as_plain_python(
     base = scenario(f'own_{type(error).__name__}', '')
     columns = rollouts(base, 'own', {'controllers.own.k_P': GAINS}, threads=2)
     assert set(columns['status']) == {'ok'}
+    assert not in_columns(base, 'own', 'controllers.own.k_P', GAINS), 'each is tried at rest'
     (line,) = capsys.readouterr().err.splitlines()  # once, whatever the number of threads
     assert 'the law PI runs as plain Python' in line
     assert type(error).__name__ in line

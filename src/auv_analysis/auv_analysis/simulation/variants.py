@@ -39,6 +39,7 @@ NUMERIC = (
     'rigid_body', 'inertia_matrix', 'hydrostatics', 'added_mass', 'damping', 'lift', 'environment',
 )  # fmt: skip
 TERM = ('amplitude', 'omega', 'phase')
+SEEDS = 1 << 63  # that there are, from zero on
 SHAPES = ((6,), (6, 6))  # of what stands for a matrix, beside a number where that may stand
 
 
@@ -61,42 +62,50 @@ def in_columns(scenario: Scenario, controller: str, path: str, values: np.ndarra
     if head == 'vehicle':
         return _vehicle_fits(scenario, rest, values)
     if head == 'disturbance':
-        apart = scenario.vehicle.M_RB is not None
-        return apart and len(rest) == 2 and rest[1] in RELATIVE and values.ndim == 1
+        return values.ndim == 1 and _error_fits(scenario, rest)
     if head == 'setpoint':
         return values.ndim == 1 and _setpoint_fits(scenario.data['setpoint'], rest)
-    return head == 'seed' or (head == 'initial' and _fits(scenario.data, keys, values, ()))
+    return (head == 'seed' and _are_seeds(values)) or (
+        head == 'initial' and _fits(scenario.data, keys, values, ())
+    )
+
+
+def _are_seeds(values: np.ndarray) -> bool:
+    whole = values.dtype.kind in 'iu' and values.ndim == 1
+    return whole and bool(np.all((values >= 0) & (values < SEEDS)))
+
+
+def _error_fits(scenario: Scenario, keys: Keys) -> bool:
+    """A relative error of an entry that has such, of a vehicle that can have them."""
+    specs = scenario.data['disturbance'] if scenario.vehicle.M_RB is not None else []
+    match keys:
+        case (int(i), name):
+            return name in RELATIVE and i < len(specs) and specs[i]['kind'] == 'model_error'
+    return False
 
 
 def _setpoint_fits(spec: Mapping[str, Any], keys: Keys) -> bool:
     """A number of a degree of freedom that has a set-point, of a term that there is."""
     entry = spec.get(str(keys[0]))
-    if 'file' in spec or entry is None:
+    if entry is None:
         return False
     match keys[1:]:
         case ('offset',):
             return True
-        case ('terms', int(j), name):
-            return j < len(entry.get('terms', [])) and name in TERM
+        case ('terms', int(j), _):
+            return j < len(entry.get('terms', []))
     return False
 
 
 def _gain_fits(scenario: Scenario, controller: str, keys: Keys, values: np.ndarray) -> bool:
     entry = scenario.data['controllers'][controller]
-    known = keys and keys[0] in entry and keys[0] not in ('law', 'anti_windup')
-    return bool(known and entry['law'] in SHIPPED and _fits(entry, keys, values, (*SHAPES, ())))
+    gain = entry['law'] in SHIPPED and keys != ('anti_windup',)
+    return gain and _fits(entry, keys, values, (*SHAPES, ()))
 
 
 def _vehicle_fits(scenario: Scenario, keys: Keys, values: np.ndarray) -> bool:
-    """Not where more than M, D and g depends on the vehicle, nor for what is no number."""
-    thrusters = scenario.data.get('actuators', {}).get('thrusters', False)
-    currents = any(spec['kind'] == 'current' for spec in scenario.data['disturbance'])
-    numeric = keys[0] in NUMERIC
-    return (
-        numeric
-        and not (thrusters or currents)
-        and _fits(scenario.vehicle_data, keys, values, SHAPES)
-    )
+    """Numbers of M, D and g."""
+    return keys[0] in NUMERIC and _fits(scenario.vehicle_data, keys, values, SHAPES)
 
 
 def _fits(data: Any, keys: Keys, values: np.ndarray, shapes: Sequence[tuple[int, ...]]) -> bool:
@@ -158,13 +167,11 @@ class Variants:
         """What closed loops must have in common to run in one batch."""
         scenario, loop = self.scenarios[0], self.loop
         sizes = tuple(np.shape(array)[1:] for array in arrays(loop))
-        actuators = loop.actuators.ideal, loop.actuators.delay
-        numbers_in_common = loop.truth.exact, *actuators, loop.faults
-        guard = loop.guard.integrals, loop.guard.reach.bounded, loop.actuators.reach.bounded
+        common = loop.truth.exact, loop.actuators.delay, loop.guard.integrals, loop.faults
         time = scenario.step, scenario.steps, scenario.data['integrator']
-        water = scenario.uncertainty.current is None, scenario.senses, scenario.faults.thrusters
+        tables = scenario.uncertainty.current is None, scenario.senses
         waves = self.setpoint and tuple(terms.shape[1] for terms in self.setpoint.terms)
-        return type(loop.gains), sizes, numbers_in_common, guard, time, water, waves
+        return type(loop.gains), sizes, common, time, tables, waves
 
 
 def merged(parts: Sequence[Variants]) -> Variants:
@@ -218,8 +225,7 @@ def packed_variants(
     good = np.ones(count, bool)
     for path, values in columns.items():
         good &= within(scenario, path, values)
-    by_keys = {split(path): np.array(values, float) for path, values in columns.items()}
-    safe = {keys: _harmless(scenario, keys, values, good) for keys, values in by_keys.items()}
+    safe = {split(path): _harmless(values, good) for path, values in columns.items()}
     loop = with_batch_axis(loop_of(scenario, controller))
     gains = _gains(scenario, controller, safe, count, good)
     loop = loop._replace(gains=gains or loop.gains)
@@ -255,12 +261,10 @@ def _setpoint(
     return Harmonics(offset, tuple(terms))
 
 
-def _harmless(scenario: Scenario, keys: Keys, values: np.ndarray, good: np.ndarray) -> np.ndarray:
-    """Values with those of the rows that are not good put to one that is, or to zero."""
-    if good.all():
-        return values
-    kept = values.copy()
-    kept[~good] = values[good][0] if good.any() else 0.0
+def _harmless(values: np.ndarray, good: np.ndarray) -> np.ndarray:
+    """Copy of values with zero in the rows that are not good."""
+    kept = np.array(values, float)
+    kept[~good] = 0.0
     return kept
 
 
@@ -319,8 +323,7 @@ def _truth(
             specs[int(keys[1])][str(keys[2])] = values
     errors = [spec for spec in specs if spec['kind'] == 'model_error']
     for key in RELATIVE:
-        left = 1 + sum(np.asarray(error.get(key, 0.0)) for error in errors)
-        good &= (left > 0) if key == 'mass' else (left >= 0)
+        good &= 1 + sum(np.asarray(error.get(key, 0.0)) for error in errors) > 0
     plant, M_RB = with_errors(vehicle, errors)
     accepted = is_definite(plant.M)
     good &= accepted

@@ -31,7 +31,16 @@ def test_the_largest_wrench_is_that_of_the_best_thrusts() -> None:
         ([0.0, 0, 0, 0, 1e-12, 0.1], []),  # rounding of a moment, though there is no force
         ([1.0, None, 1, None, None, 0.1], []),
         ([1.0, 0, 1, 0.1, 0.2, 0.1], ['pitch (up to 0.200 N m, not apart from surge and heave)']),
-        ([1e3, 0, 0, 0, 0, 0], ['times the weight', 'more is commanded than the thrusters']),
+        # much more than rounding of the moments, and less than that of the force
+        ([100.0, 0, 0, 0, 5e-5, 0.1], ['and heave) is commanded, which no thruster actuates']),
+        ([0.0, 0, 0, 0, 1e3, 0], ['pitch (up to 1\u202f000 N m, ']),  # no thruster is too weak
+        (
+            [1e3, 0, 150, 0, 0, 0],
+            [
+                'N in surge, is 8.9 times the weight',
+                'can give: 1\u202f000 of at most 130 N in surge and 150 of at most 103 N in heave',
+            ],
+        ),
     ],
 )
 def test_what_is_remarkable_of_the_largest_commands(largest, words) -> None:
@@ -45,6 +54,7 @@ def test_what_is_remarkable_of_the_largest_commands(largest, words) -> None:
 def test_without_thrusters_only_the_weight_is_known() -> None:
     vehicle = load_vehicle('rexrov')
     assert beyond_authority(vehicle, [1.0, 0, 0, 9e9, 0, 0]) == []
+    assert beyond_authority(vehicle, [vehicle.weight, 0, 0, 0, 0, 0]) == []
     (text,) = beyond_authority(vehicle, [0.0, 0, 3 * vehicle.weight, 0, 0, 0])
     assert 'in heave, is 3.0 times the weight' in text
 

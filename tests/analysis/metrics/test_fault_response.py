@@ -9,6 +9,7 @@ import pytest
 from auv_analysis import simulate
 from auv_analysis.metrics.fault_response import (
     FILE,
+    fault_rows,
     responses,
     windows_of,
     write_responses,
@@ -65,7 +66,22 @@ def test_a_fault_that_follows_at_once_is_not_looked_at(made):
     assert (first.rms[2], first.recovery, first.until) == (None, None, 14.0)
     assert (second.rms[0], second.until) == (None, 30.0)
     together = LOST._replace(number=3)
-    assert windows_of(LOST, replace(made, faults=(LOST, together)))[2] == (14.0, 18.0)
+    found = windows_of(LOST, replace(made, faults=(LOST, together)))
+    assert found == ((6.0, 10.0), (10.0, 14.0), (14.0, 18.0))
+
+
+def test_a_run_that_begins_later_has_later_windows(made):
+    faults = [one._replace(start=one.start + 100.0, end=one.end + 100.0) for one in (LOST, LATE)]
+    later = replace(made, t=made.t + 100.0, faults=tuple(faults))
+    for one, other in zip((LOST, LATE), faults, strict=True):
+        shifted = np.array(windows_of(one, made)) + 100.0
+        np.testing.assert_allclose(windows_of(other, later), shifted, rtol=1e-12)
+    pairs = zip(responses(made), responses(later), strict=True)
+    for one, other in pairs:
+        assert (other.rms, other.recovery) == (pytest.approx(one.rms), one.recovery)
+        assert other.until == (None if one.until is None else one.until + 100.0)
+    begun = faults[0]._replace(start=97.0)  # before what was recorded
+    assert windows_of(begun, replace(later, faults=(begun,)))[:2] == ((100, 100), (100, 114))
 
 
 def test_errors_recovery_and_effort(made):
@@ -90,15 +106,29 @@ def test_an_error_that_is_outside_at_the_end_is_not_recovered(made):
     assert found[1, 'sway'].until == 20.0
 
 
-def test_blocks_of_a_run_give_the_same(made):
+def test_what_follows_a_fault_begins_with_the_sample_at_its_end(made):
+    nu = made.nu_d - 0.001
+    nu[1400, 1] -= 0.1
+    ends = [LOST, LOST._replace(number=2, start=28.0, end=30.0)]
+    found = responses(replace(made, nu=nu, faults=(*ends, ends[1]._replace(number=3, end=30.02))))
+    first, second, third = (found[6 * i + 1] for i in range(3))
+    assert (first.recovery, first.until) == (H, 28.0)
+    assert (second.recovery, second.until) == (0.0, 30.0), 'with the run'
+    assert (third.recovery, third.until) == (None, None)
+
+
+@pytest.mark.parametrize('error', [None, 0.05])
+def test_blocks_of_a_run_give_the_same(made, error):
+    whole = made if error is None else replace(made, nu=made.nu_d - error)
+
     class InBlocks:
         def __getattr__(self, name):
-            return getattr(made, name)
+            return getattr(whole, name)
 
         def blocks(self, rows=0):
-            return made.blocks(137)
+            return whole.blocks(137)
 
-    for one, other in zip(responses(InBlocks()), responses(made), strict=True):
+    for one, other in zip(responses(InBlocks()), responses(whole), strict=True):
         pairs = zip(one.rms, other.rms, strict=True)
         assert all(a == b or a == pytest.approx(b, rel=1e-12) for a, b in pairs)
         assert (one.recovery, one.peak, one.until) == (other.recovery, other.peak, other.until)
@@ -127,6 +157,8 @@ def test_every_number_of_the_tables_is_in_the_file(made, tmp_path):
     held = parquet.read_table(tmp_path / FILE)
     numbers = parquet.read_table(tmp_path / 'numbers.parquet').to_pylist()
     assert len(numbers) == 90
+    named = fault_rows({'mine': found['gvc']})
+    assert {(row['controller'], row['law']) for row in named} == {('mine', 'gvc')}
     first = next(iter(found['gvc']))
     (begin, end), _, (_, last) = first.windows
     assert f'. Before is {begin:g}–{end:.6g} s, after is ' in tables[0].caption
@@ -148,9 +180,10 @@ def test_every_number_of_the_tables_is_in_the_file(made, tmp_path):
         ({'kind': 'actuator', 'axis': 'yaw', 'stuck': 2}, 'yaw actuator stuck at 2 N m'),
         ({'kind': 'actuator', 'axis': 'sway', 'efficiency': 0.4}, 'sway actuator at 40 %'),
         (
-            {'kind': 'sensor_bias', 'velocity': [0.1, 0, 0, 0, 0, -0.2], 'attitude': [0, 0.3, 0]},
-            'biased surge +0.1 m/s, yaw -0.2 rad/s, pitch angle +0.3 rad',
+            {'kind': 'sensor_bias', 'velocity': [0.1, 0, 0, 4, 0, -0.2], 'attitude': [0, 0.3, 0]},
+            'biased surge +0.1 m/s, roll +4 rad/s, yaw -0.2 rad/s, pitch angle +0.3 rad',
         ),
+        ({'kind': 'sensor_bias', 'velocity': [0.0] * 6}, 'biased by zero'),
     ],
 )
 def test_faults_in_words(spec, words):
@@ -158,7 +191,7 @@ def test_faults_in_words(spec, words):
 
 
 def test_marks_name_thrusters_and_times():
-    specs = [{'kind': 'thruster', 'thruster': 2, 'efficiency': 0.0, 'to': 3.0},
+    specs = [{'kind': 'thruster', 'thruster': 2.0, 'efficiency': 0.0, 'to': 3.0},
              {'kind': 'wrench_loss', 'from': 1.5}, {'kind': 'sensor_drop_out'}]  # fmt: skip
     marks = marks_of(specs, load_vehicle('bluerov2_heavy'))
     assert [mark.label for mark in marks] == [

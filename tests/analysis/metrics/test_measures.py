@@ -13,6 +13,7 @@ from auv_analysis.metrics.measures import (
     described,
     flat,
 )
+from auv_analysis.metrics.quantities import quantity
 from auv_analysis.simulation.reduction import COLUMNS
 from auv_dynamics.vehicle import DOFS
 
@@ -69,9 +70,12 @@ def test_measures_sum_up_their_columns(values) -> None:
     def value(name):
         return BY_NAME[name].of(lambda column: of[column.rpartition('.')[2]])[0]
 
-    assert value('overall.effort.rms.linear') == pytest.approx(np.linalg.norm(values[:3]))
-    assert value('overall.effort.rms.angular') == pytest.approx(np.linalg.norm(values[3:]))
-    assert value('overall.coupling.delta_pi_max.angular') == np.abs(values[3:]).max()
+    halves = {'linear': values[:3], 'angular': values[3:]}
+    for name, half in ((name, name.rpartition('.')[2]) for name in BY_NAME):
+        if half in halves:
+            order = 2 if '.rms.' in name else np.inf
+            assert value(name) == pytest.approx(np.linalg.norm(halves[half], order)), name
+            assert ('of the vector of the three' in BY_NAME[name].meaning) == (order == 2)
     assert value('overall.velocity_error.settling_time') == np.abs(values).max()
 
 
@@ -81,4 +85,6 @@ def test_every_column_says_its_unit() -> None:
         assert all((label, unit, meaning)), name
     assert described('effort.rms.surge')[1] == 'N'
     assert described('effort.rms.roll')[1] == 'N m'
+    assert quantity('overall.effort.rms.linear').unit == 'N'
+    assert quantity('overall.effort.rms.angular').unit == 'N m'
     assert len({measure.label for measure in MEASURES}) == len(MEASURES)

@@ -65,9 +65,8 @@ def windows_of(mark: Mark, run: RunInfo) -> tuple[Window, Window, Window]:
         first += TRANSIENT
     start, end = max(mark.start, first), min(mark.end, last)
     length = max(end - start, SHORTEST)
-    others = [other for other in run.faults if other != mark]
-    begun = [other.start for other in others if other.start < start]
-    ended = [other.end for other in others if other.end <= start]
+    begun = [other.start for other in run.faults if other.start < start]
+    ended = [other.end for other in run.faults if other.end <= start]
     before = max([first, start - length, *begun, *ended])
     return (before, start), (start, end), (end, min(end + length, next_change(mark, run)))
 
@@ -75,9 +74,8 @@ def windows_of(mark: Mark, run: RunInfo) -> tuple[Window, Window, Window]:
 def next_change(mark: Mark, run: RunInfo) -> float:
     """Time of the first begin or end of another fault behind the end of this one, or of the end."""
     last = run.start + run.duration + run.step / 2
-    others = [other for other in run.faults if other != mark]
-    begins = [other.start for other in others if other.start >= mark.end]
-    return min([last, *begins, *(other.end for other in others if other.end > mark.end)])
+    begins = [other.start for other in run.faults if other.start >= mark.end]
+    return min([last, *begins, *(other.end for other in run.faults if other.end > mark.end)])
 
 
 def responses(run: AnyRun) -> list[FaultResponse]:

@@ -116,6 +116,9 @@ def test_changed_scenario_has_the_values_and_leaves_the_first_as_it_was() -> Non
     assert new.steps == 200
     assert new.setpoint.value(0.0)[1] == 0.25
     assert (CASE1.data, CASE1.vehicle_data) == before
+    given = {'nu': [1, 0, 0, 0, 0, 0]}
+    assert changed_scenario(CASE1, {'initial': given}).initial[0].tolist() == [0.0] * 6
+    assert given == {'nu': [1, 0, 0, 0, 0, 0]}
 
 
 def test_another_vehicle_is_put_in_place_before_its_values_are() -> None:

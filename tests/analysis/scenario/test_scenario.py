@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 from auv_analysis import load_scenario
+from auv_analysis.scenario import scenario as scenario_module
 from auv_analysis.scenario.scenario import Scenario, write_inputs
 from auv_analysis.studies.sweep import campaign
 from auv_dynamics import load_vehicle
@@ -265,6 +266,35 @@ def test_schema_is_one_and_says_what_is_expected_everywhere(kind: str) -> None:
     assert list(contradictions(yaml_files.schema(SCHEMAS[kind]))) == []
 
 
+def test_a_run_of_too_many_steps_is_refused(tmp_path: Path) -> None:
+    assert loaded(tmp_path, step=1e-3, duration=1e4).steps == scenario_module.MOST_STEPS
+    with pytest.raises(InputError, match='duration: expected at most 10000000 steps'):
+        loaded(tmp_path, step=1e-3, duration=10000.001)
+
+
+def test_gains_of_every_controller_are_checked(tmp_path: Path) -> None:
+    pid = {'law': 'pid', 'k_P': 1, 'k_I': 1, 'k_D': 1, 'omega_f': -1}
+    with pytest.raises(InputError, match=r'controllers\.pid\.omega_f: expected a positive'):
+        loaded(tmp_path, controllers={**LEAST['controllers'], 'pid': pid})
+
+
+def test_all_kinds_of_disturbances_are_known(tmp_path: Path) -> None:
+    scenario = loaded(tmp_path, disturbance=[HARMONIC, {'kind': 'herman2018'}])
+    assert scenario.kinds == {'harmonic', 'herman2018'}
+
+
+def test_a_scenario_is_printed_in_a_line(tmp_path: Path) -> None:
+    controllers = dict.fromkeys(('one', 'other'), LEAST['controllers']['only'])
+    text = repr(loaded(tmp_path, controllers=controllers))
+    assert text == '<Scenario least: vehicle rexrov, one, other, 4 s>'
+
+
+def test_what_is_odd_of_a_vehicle_is_warned_of(tmp_path: Path) -> None:
+    scenario = load_scenario('case1')
+    odd = replace(scenario, vehicle=scenario.vehicle.changed(warnings=('too light',)))
+    assert odd.warnings == ['too light']
+
+
 def test_initial_angles_in_degrees_are_warned_of() -> None:
     scenario = load_scenario('case1')
     before = scenario.warnings
@@ -274,3 +304,6 @@ def test_initial_angles_in_degrees_are_warned_of() -> None:
     (warning,) = [w for w in replace(scenario, data=data).warnings if w not in before]
     assert 'initial.eta' in warning
     assert 'degrees?' in warning
+    for angle, count in ((-6.3, 1), (6.2, 0)):
+        data['initial']['eta'][3] = data['initial']['eta'][4] = angle
+        assert len(replace(scenario, data=data).warnings) == len(before) + count

@@ -27,17 +27,22 @@ OPEN = {
 
 def scenario_of(folder: Path, **changes) -> Scenario:
     path = folder / 'open.yaml'
-    path.write_text(yaml.safe_dump(OPEN | changes))
+    values = {key: value for key, value in (OPEN | changes).items() if value is not None}
+    path.write_text(yaml.safe_dump(values))
     return load_scenario(path)
 
 
 def test_the_wrench_is_that_of_the_excitation(tmp_path: Path) -> None:
-    run = simulate(scenario_of(tmp_path), 'open_loop', 'zoh')
+    open_loop = {'law': 'multisine', 'anti_windup': True}  # which is no gain
+    run = simulate(scenario_of(tmp_path, controllers={'open_loop': open_loop}), 'open_loop', 'zoh')
     expected = np.zeros_like(run.tau)
     expected[:, 0] = 1.0 + 20.0 * np.sin(0.5 * run.t) + 10.0 * np.sin(1.7 * run.t + 1.0)
     expected[:, 5] = -2.0 * np.sin(0.9 * run.t)
     np.testing.assert_allclose(run.tau, expected, atol=1e-12)
     assert np.abs(run.nu[-1, 0]) > 0.1
+    six = SURGE | {'terms': SURGE['terms'] * 3}
+    gains = scenario_of(tmp_path, excitation={'surge': six}).gains('open_loop')
+    np.testing.assert_array_equal(gains.omega[:6], [0.5, 1.7] * 3)
     assert not run.disturbance_estimate.any()
 
 
@@ -64,6 +69,11 @@ def test_many_at_once_are_those_alone(tmp_path: Path) -> None:
     [
         ({'excitation': {'sway': {'terms': [{'amplitude': 1.0, 'omega': 1.0}] * 7}}},
          'excitation.sway.terms: expected at most 6 terms, found 7'),
+        ({'excitation': None},
+         'excitation: expected a mapping of degrees of freedom, the wrench of the law multisine, '
+         'found nothing'),
+        ({'controllers': {'pid': {'law': 'pid', 'k_P': 1.0, 'k_I': 1.0, 'k_D': 1.0}}},
+         'controllers: expected one of law multisine, which follows excitation, found pid'),
         ({'controllers': {'open_loop': {'law': 'multisine', 'omega': 2.0}}},
          'controllers.open_loop: expected no gains beside the law: excitation is its wrench, '
          'found omega'),

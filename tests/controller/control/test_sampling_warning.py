@@ -116,3 +116,9 @@ def test_the_states_of_a_law_have_a_rate_of_their_own():
     assert "the law's own states: rate * step = 3" in state_warning(fast, 0.1)
     assert 'is unstable' in state_warning(fast, 0.1)
     assert state_warning(CL(M, M, M, M), 10.0) is None, 'it has no such states'
+    turning = np.diag([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    turning[0, 5], turning[5, 0] = -40.0, 40.0  # eigenvalues 3.5 +- 39.9i
+    fastest = float(np.abs(np.linalg.eigvals(turning)).max())
+    gains = make_gains('pid', {'k_P': 5.0, 'k_I': 1.0, 'k_D': 0.1, 'omega_f': turning})
+    assert type(gains).own_rate(gains) == pytest.approx(fastest)
+    assert f'rate * step = {fastest / 10:.3g}' in state_warning(gains, 0.1)

@@ -43,6 +43,9 @@ def test_body_gains_are_those_inside_the_layer():
     K_D, K_f = SMC.body_gains(gains, None)
     assert_allclose(K_D, np.diag(1.0 + k_S / PHI), rtol=1e-12)
     assert_allclose(K_f, 2.0 * np.eye(6))
+    full = np.arange(1.0, 37.0).reshape(6, 6)
+    K_D, _ = SMC.body_gains(make_gains('smc', GAINS | {'k_S': full, 'phi': PHI}), None)
+    assert_allclose(K_D, np.eye(6) + full @ np.diag(1 / PHI), rtol=1e-12)
 
 
 @pytest.mark.parametrize(

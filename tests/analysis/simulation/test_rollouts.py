@@ -490,6 +490,16 @@ def test_other_wrong_arguments():
     sensed = scenario_of('gvc', sensors=NOISY)
     with pytest.raises(InputError, match='zoh'):
         rollouts(sensed, 'gvc', {})
+    with pytest.raises(InputError, match='actuators: expected hold'):
+        rollouts(scenario_of('gvc', sensors=NOISY, actuators=LIMITED), 'gvc', {})
+
+
+@pytest.mark.parametrize(('step', 'samples'), [(0.01, 200), (0.01, 201), (0.1, 21)])
+def test_the_first_late_sample_is_that_of_the_transient(step, samples):
+    short = changed_scenario(GVC, {'step': step, 'duration': (samples - 1) * step})
+    columns = rollouts(short, 'gvc', {})
+    same_as_alone(short, 'gvc', {}, 'continuous', columns, [0])
+    assert np.isnan(columns['velocity_error.max_after_2s.surge'][0]) == (samples == 200)
 
 
 def test_no_changes_give_the_run_of_the_scenario():

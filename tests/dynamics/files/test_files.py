@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 from helpers.strategies import QUICK
@@ -19,9 +20,16 @@ from hypothesis import strategies as st
 from auv_analysis import load_scenario
 from auv_dynamics import load_vehicle
 from auv_dynamics.files import yaml_files
-from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.errors import InputError, reason, shorten
 from auv_dynamics.files.shipped import shipped
-from auv_dynamics.files.yaml_files import check, parse_any_yaml, read_yaml, yaml_text
+from auv_dynamics.files.yaml_files import (
+    check,
+    matrix6,
+    parse_any_yaml,
+    read_yaml,
+    validate,
+    yaml_text,
+)
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 
 BOMB = 'a: &a [x, x, x, x, x, x, x, x, x]\n' + ''.join(
@@ -134,6 +142,59 @@ def test_half_a_character_is_refused_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match='name: expected whole characters') as caught:
         load_vehicle(path)
     one_line(caught.value, str(path))
+
+
+@pytest.mark.parametrize('end', ['\n', '\r\n', '\r'])
+def test_lines_end_as_on_any_system(end: str, tmp_path: Path) -> None:
+    path = tmp_path / 'lines.yaml'
+    path.write_bytes(end.join(['name: x', 'seed: 1', '']).encode())
+    assert read_yaml(path, 'scenario') == {'name': 'x', 'seed': 1}
+
+
+def test_a_text_that_is_too_long_is_refused_before_it_is_read() -> None:
+    with pytest.raises(InputError, match='YAML of at most 4194304 characters, found 4194305'):
+        parse_any_yaml('#' * ((4 << 20) + 1), 'a text')
+
+
+def test_what_was_found_is_shown_in_short() -> None:
+    assert shorten([1234] * 10) == repr([1234] * 10), 'sixty characters'
+    assert shorten([12345] * 10) == f'{[12345] * 10!r:.57}...'
+    error = InputError('a\x1b[2J', 'key', 'less', 'm' * 201)
+    assert error.found == f'{"m" * 197}...'
+    assert str(error) == f'a\N{REPLACEMENT CHARACTER}[2J: key: expected less, found {error.found}'
+    assert reason(OSError(13, 'Permission denied')) == 'permission denied'
+    assert reason(OSError('Odd')) == 'odd'
+
+
+NUMBER = {'title': 'a number', 'type': 'number'}
+THREE = {'title': 'a file', 'type': 'object', 'required': ['a'], 'additionalProperties': False,
+         'properties': dict.fromkeys('abc', NUMBER)}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ('data', 'said'),
+    [
+        ({'b': 'x', 'd': 1}, 'd: expected one of a, b, c.*, found an unknown key'),
+        ({'b': 'x'}, 'b: expected a number, found x'),
+        ({'b': 1}, 'a: expected a number, found nothing'),
+        ({'a': 2e100}, r'a: expected a finite number, at most 1e\+100'),
+        ({'a': [[1, 2, 3]] * 2}, r'a: expected a number, found 2x3 \['),
+        ({'a': [[1], [1, 2, 3], [1, 2]]}, 'found 3 rows of 1 to 3 entries'),
+    ],
+)
+def test_the_first_of_several_errors_is_what_explains_the_others(data: dict, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        validate(data, THREE, 'f')
+    validate({'a': 1e100}, THREE, 'f')
+
+
+def test_a_matrix_is_a_copy_of_its_own() -> None:
+    given = np.arange(36.0).reshape(6, 6)
+    assert not np.shares_memory(matrix6(given), given)
+    for same in (given, given.ravel(), given.tolist()):
+        np.testing.assert_array_equal(matrix6(same), given)
+    for one in (3, [3.0]):
+        np.testing.assert_array_equal(matrix6(one), 3.0 * np.eye(6))
 
 
 def test_byte_order_mark_is_no_part_of_the_first_key(tmp_path: Path) -> None:

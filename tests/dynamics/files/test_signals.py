@@ -35,6 +35,13 @@ def test_a_signal_that_has_waited_does_what_it_would_have_done(number) -> None:
             signal.raise_signal(number)
             done.append('waited')
         assert done[1:] == ['waited', 'told'], 'once, and afterwards'
+    seen = []
+    for one in ENDING:
+        signal.signal(one, lambda number, _: seen.append(number))
+    with undisturbed():
+        signal.raise_signal(number)
+        signal.raise_signal(ENDING[number == ENDING[0]])
+    assert seen == [number], 'the first that came'
     signal.signal(number, signal.SIG_IGN)
     with undisturbed():
         signal.raise_signal(number)

@@ -26,6 +26,7 @@ from auv_dynamics.files.yaml_files import (
     check,
     matrix6,
     parse_any_yaml,
+    read_text,
     read_yaml,
     validate,
     yaml_text,
@@ -148,7 +149,7 @@ def test_half_a_character_is_refused_in_one_line(tmp_path: Path) -> None:
 def test_lines_end_as_on_any_system(end: str, tmp_path: Path) -> None:
     path = tmp_path / 'lines.yaml'
     path.write_bytes(end.join(['name: x', 'seed: 1', '']).encode())
-    assert read_yaml(path, 'scenario') == {'name': 'x', 'seed': 1}
+    assert read_text(path, 'scenario') == 'name: x\nseed: 1\n'
 
 
 def test_a_text_that_is_too_long_is_refused_before_it_is_read() -> None:
@@ -186,6 +187,9 @@ def test_the_first_of_several_errors_is_what_explains_the_others(data: dict, sai
     with pytest.raises(InputError, match=said):
         validate(data, THREE, 'f')
     validate({'a': 1e100}, THREE, 'f')
+    nested = THREE | {'properties': {'a': NUMBER, 'c': THREE}}
+    with pytest.raises(InputError, match=r'c\.d: expected one of a, b, c'):
+        validate({'a': 'x', 'c': {'a': 1, 'd': 1}}, nested, 'f')
 
 
 def test_a_matrix_is_a_copy_of_its_own() -> None:
@@ -292,6 +296,7 @@ def test_absurd_centre_of_gravity_is_refused(largest: float) -> None:
 def test_what_is_sound_is_so_by_one_schema(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What was checked is remembered: by which schema, and nothing that was refused."""
     monkeypatch.setattr(yaml_files, 'MOST_SOUND', 2)
+    monkeypatch.setattr(yaml_files, '_SOUND', remembered := set())
     paths = {}
     for kind in ('number', 'string'):
         entry = {'title': f'a {kind}', 'type': kind}
@@ -307,3 +312,4 @@ def test_what_is_sound_is_so_by_one_schema(tmp_path: Path, monkeypatch: pytest.M
             check({'x': x}, paths[kind], 'f')
             with pytest.raises(InputError, match=f'f: x: expected a {other}, found'):
                 check({'x': x}, paths[other], 'f')
+            assert 0 < len(remembered) <= 2

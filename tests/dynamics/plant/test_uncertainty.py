@@ -186,6 +186,10 @@ def test_a_varying_current_with_constant_terms_is_the_constant_one():
     assert_allclose(plants[0].x, plants[1].x, rtol=0, atol=1e-14)
 
 
+def twice(key: str, value: float) -> list[dict]:
+    return [{'kind': 'model_error', key: value}] * 2
+
+
 ASKEW = np.triu(np.ones((6, 6))).tolist()
 VARYING = {'kind': 'current', 'north': {'terms': [{'amplitude': 0.1, 'omega': 1.0}]}}
 
@@ -196,8 +200,12 @@ VARYING = {'kind': 'current', 'north': {'terms': [{'amplitude': 0.1, 'omega': 1.
         ('herman2018', [VARYING], 'd0.north', 'constant current'),
         ('rexrov', [VARYING, {'kind': 'model_error', 'dM': 1.0}], 'd0.north', 'beside dM'),
         ('herman2018', [ERRORS], 'd0.mass', 'dM and dD'),
-        ('rexrov', [{'kind': 'model_error', 'mass': -0.6}] * 2, 'd0.mass', 'sum of all entries'),
-        ('rexrov', [{'kind': 'model_error', 'damping': -0.6}] * 2, 'd0.damping', 'sum of all'),
+        ('rexrov', twice('mass', -0.6), 'd0.mass', 'sum of all entries'),
+        ('rexrov', twice('damping', -0.6), 'd0.damping', 'least -1, found -1.2'),
+        ('rexrov', twice('added_mass', -0.6), 'd0.added_mass', 'of at least -1'),
+        ('herman2018', twice('buoyancy', -0.6), 'd0.buoyancy', 'of at least -1'),
+        ('rexrov', twice('mass', -0.5), 'd0.mass', 'above -1, found -1'),
+        ('rexrov', [VARYING, twice('mass', -1.5)[0]], 'd1.mass', 'above -1, found -1.5'),
         ('herman2018', [{'kind': 'model_error', 'damping': 0.1}], 'd0.damping', 'dM and dD'),
         ('rexrov', [{'kind': 'model_error', 'dM': -1e5}], 'd0', 'positive definite'),
         ('rexrov', [{'kind': 'model_error', 'dM': ASKEW}], 'd0.dM', 'symmetric'),
@@ -229,6 +237,13 @@ def test_without_errors_F_is_the_disturbance_to_the_last_bit():
     assert uncertainty.truth.exact
     plant = plant_of(vehicle, specs, 0.01, 'ode5', initial_state(np.zeros(6), np.zeros(6)))
     assert push(plant, TAU)[1] == tuple(uncertainty.F(np.zeros(1))[0])
+
+
+def test_relative_errors_may_leave_nothing_but_of_the_mass():
+    gone = [{'kind': 'model_error', 'damping': -0.5, 'added_mass': -0.5, 'buoyancy': -0.5}] * 2
+    truth = make_uncertainty(load_vehicle('rexrov'), gone, 'f', ['a', 'b']).truth
+    assert not truth.model.D_linear.any()
+    assert_allclose(truth.model.M, truth.M_RB)
 
 
 def test_an_exactly_singular_M_is_refused_in_one_line():

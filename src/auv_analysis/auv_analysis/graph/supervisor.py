@@ -17,7 +17,7 @@ from auv_dynamics.ros.interface import PARENT
 if TYPE_CHECKING:
     from auv_analysis.graph.fork_server import Forked
 
-GRACE, WRITING = 5.0, 30.0  # s between SIGTERM and SIGKILL, and for the one that writes
+GRACE, WRITING = 5.0, 30.0  # s between SIGTERM and SIGKILL, and for who writes or was killed
 Begin = Callable[..., 'psutil.Popen | Forked']
 
 
@@ -150,7 +150,7 @@ class Supervisor:
                 _, alive = psutil.wait_procs(group, timeout=grace)
                 for process in alive:
                     process.kill()
-                psutil.wait_procs(alive, timeout=GRACE)
+                psutil.wait_procs(alive, timeout=WRITING)
         for log in self._outputs.values():
             log.close()
         return self.ended()

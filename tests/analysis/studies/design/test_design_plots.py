@@ -103,8 +103,8 @@ def test_a_coupling_that_vanishes_stands_at_the_left_and_a_faint_one_nowhere() -
             for name, before in (('delta_xi.sway', 0.5), ('delta_pi.yaw', 0.5 * 1e-4))
         ],
     }  # fmt: skip
-    draw, _ = design._couplings(document)
-    (axes,) = draw().axes
+    figure, _, _ = design._couplings(document)
+    (axes,) = figure.axes
     drawn = np.concatenate([line.get_xdata() for line in artists.lines(axes)])
     assert drawn.min() == pytest.approx(1e-3 * 1e-4 * 0.5)
     assert len(axes.get_yticklabels()) == 1

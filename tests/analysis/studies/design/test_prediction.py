@@ -20,7 +20,6 @@ from auv_analysis.studies.design.prediction import (
     RecordedMotion,
     accelerations,
     effort_of,
-    score,
     shares_of,
     sizes_of,
     smooth_peak,
@@ -164,7 +163,8 @@ def test_what_the_score_asks_for(prediction, change, better):
     values = {key: np.array(value) for key, value in change.items()}
     if 'shares' in change:
         values['shares'] = change['shares'] * before.shares
-    found, usual = (float(score(one, before, 10)) for one in (same._replace(**values), same))
+    objective = Objective(prediction[0], 10)
+    found, usual = (float(objective.of(one)) for one in (same._replace(**values), same))
     assert (found < usual) == better
     assert found != usual
 

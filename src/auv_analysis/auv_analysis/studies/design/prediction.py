@@ -354,28 +354,6 @@ def decomposed(M: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return inverse_upper(upper), upper, N
 
 
-def score(metrics: Metrics, before: Sizes, target: int, others: float = OTHERS) -> np.ndarray:
-    """r^2 + 0.1 (o^2 + e^2) + 0.3 at_rest + 0.01 size.
-
-    r is the largest magnitude of the coupling, o the root sum square of the shares of all others,
-    e the root of the effort: each after by before.
-
-    Parameters
-    ----------
-    metrics : (...,), with the ratio of the target alone
-    before : of the unchanged vehicle
-    target : place in `COUPLINGS` of what is to be reduced
-    others : weight 0.1 of o^2 and e^2
-
-    """
-    rest = _without(metrics.shares, target) / (
-        _without(before.shares, target) + LEAST * (before.shares @ before.shares)
-    )
-    burden = AT_REST * metrics.at_rest + SIZE * metrics.size
-    value = metrics.ratios[..., 0] ** 2 + others * (rest + metrics.effort) + burden
-    return np.where(metrics.definite, value, IMPOSSIBLE)
-
-
 def _without(shares: np.ndarray, target: int) -> np.ndarray:
     """Sum of squares (...) of the shares (..., 12) of all couplings but one."""
     squares = shares**2
@@ -403,5 +381,15 @@ class Objective:
         return self.of(self.prediction.metrics(x, (self.target,)))
 
     def of(self, metrics: Metrics) -> np.ndarray:
-        """Score (...) of metrics, with the ratio of the target alone."""
-        return score(metrics, self.prediction.before, self.target, self.others)
+        """Score (...) of metrics: r^2 + others (o^2 + e^2) + 0.3 at_rest + 0.01 size.
+
+        r is the largest magnitude of the target, the one ratio of the metrics, o the root sum
+        square of the shares of all other couplings, e the root of the effort: each after by before.
+        """
+        before = self.prediction.before.shares
+        rest = _without(metrics.shares, self.target) / (
+            _without(before, self.target) + LEAST * (before @ before)
+        )
+        burden = AT_REST * metrics.at_rest + SIZE * metrics.size
+        value = metrics.ratios[..., 0] ** 2 + self.others * (rest + metrics.effort) + burden
+        return np.where(metrics.definite, value, IMPOSSIBLE)

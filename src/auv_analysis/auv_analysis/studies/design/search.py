@@ -25,7 +25,6 @@ from auv_analysis.studies.design.prediction import (
     Sizes,
     coupling_named,
     present,
-    score,
 )
 from auv_analysis.studies.design.setting import Setting
 from auv_analysis.studies.optimise import Search, sobol_points
@@ -136,7 +135,7 @@ class Candidate:
     x : (13,) the change
     predicted : largest magnitude of the coupling after by before, in the motion of an earlier run
     ratio : the same of the changed vehicle's own run; None: it cannot be run, `failure` says why
-    score : of `score`, of its own run, and the cost of its parts
+    score : of `Objective`, of its own run, and the cost of its parts
     run, sizes : its own run
     failure : one line
 
@@ -243,7 +242,7 @@ class Remedies:
             size=space.size(x),
             definite=True,
         )
-        value = float(score(metrics, self.before, target)) + PART * len(parts_of(x))
+        value = float(Objective(self.prediction, target).of(metrics)) + PART * len(parts_of(x))
         return replace(made, ratio=ratio, score=value, run=run, sizes=sizes)
 
 

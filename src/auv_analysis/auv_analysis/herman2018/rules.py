@@ -57,7 +57,7 @@ def pitch_slow(of: Evidence) -> Judgement:
     early = cl.peak('error', TRANSIENT, end)[Q]
     late = cl.late_peak('error')[Q]
     last = cl.last_third('error').peak[Q]
-    begin = quote('transient', TRANSIENT, 's', short)
+    begin = _transient(quote)
     text = (
         f'up to {quote("Δq, cl, at first", early, "rad/s", 2)} rad/s in '
         f'{begin}–{quote("end of the first look", end, "s", short)} s, '
@@ -206,7 +206,7 @@ def energy_in_two(of: Evidence) -> Judgement:
     together = quote('their share', float(part[order[:2]].sum()), '%', decimals(2))
     text = f'ξ{first} and ξ{second}, together {together} %'
     verdict = grade([tuple(order[:2]) == (2, 0), bool(part[[0, 2]].sum() > 99.0)])
-    return Judgement(text, verdict, quote.values, _whole_run(of.gvc))
+    return Judgement(text, verdict, quote.values, _whole(of))
 
 
 def sway_deformed(of: Evidence) -> Judgement:
@@ -214,7 +214,7 @@ def sway_deformed(of: Evidence) -> Judgement:
     peak, quote = of.gvc.peak('delta_xi'), Quotes()
     text = f'{quote("Δξ2", peak[V], "m/s", 2)} m/s'
     verdict = grade([peak[V] == max(peak[:3]) and round(peak[V], 2) == paper.SWAY_DEFORMATION])
-    return Judgement(text, verdict, quote.values, _whole_run(of.gvc))
+    return Judgement(text, verdict, quote.values, _whole(of))
 
 
 def roll_deformed(of: Evidence) -> Judgement:
@@ -226,7 +226,7 @@ def roll_deformed(of: Evidence) -> Judgement:
         f'{quote("p", rate, "rad/s", 2)} rad/s'
     )
     verdict = grade([peak[P] == max(peak[3:]) and peak[P] > rate])
-    return Judgement(text, verdict, quote.values, _whole_run(of.gvc))
+    return Judgement(text, verdict, quote.values, _whole(of))
 
 
 def pitch_input(of: Evidence) -> Judgement:
@@ -236,12 +236,12 @@ def pitch_input(of: Evidence) -> Judgement:
     text = f'pitch {quote("Δπ5", peak[Q], "N m")} N m'
     if gvc.run.duration > TRANSIENT:
         late = quote('Δπ5 after the transient', gvc.late_peak('delta_pi')[Q], 'N m')
-        text += f', {late} after {quote("transient", TRANSIENT, "s", short)} s'
+        text += f', {late} after {_transient(quote)} s'
     text += (
         f'; roll {quote("Δπ4", peak[3], "N m", 2)}, yaw {quote("Δπ6", peak[5], "N m", 2)} N m; '
         f'forces at most {quote("largest of Δπ1 to Δπ3", peak[:3].max(), "N", 2)} N'
     )
-    return Judgement(text, grade([_only_pitch(gvc)]), quote.values, _whole_run(gvc))
+    return Judgement(text, grade([_only_pitch(gvc)]), quote.values, _whole(of))
 
 
 def pitch_sensitive(of: Evidence) -> Judgement:
@@ -258,7 +258,7 @@ def pitch_sensitive(of: Evidence) -> Judgement:
         f'{quote("largest other Δπ", np.delete(peak, Q).max(), "N, N m", 2)}'
     )
     text = '; '.join([coupled, *lines])
-    return Judgement(text, grade(parts), quote.values, _whole_run(of.gvc))
+    return Judgement(text, grade(parts), quote.values, _whole(of))
 
 
 def decomposition(of: Evidence) -> Judgement:
@@ -296,10 +296,6 @@ def _window(quote: Quotes, end: float) -> str:
     return f'{begin}–{quote(f"end of 0–{end:g} s", end, "s", short)} s'
 
 
-def _whole_run(gvc: Signals) -> str:
-    return spell((0.0, gvc.run.duration))
-
-
 SLIGHTLY = 0.10  # relative difference of inputs that differ 'only slightly'
 COMPARABLE = 0.05  # of efforts that are 'comparable'
 INPUTS = ('τ_X', 'τ_Y', 'τ_Z', 'τ_K', 'τ_M', 'τ_N')
@@ -323,8 +319,7 @@ def earlier(of: Evidence) -> Judgement:
     both = zip(('gvc', 'cl'), of.both, strict=True)
     text = ' against '.join(settled(quote, law, run.run) for law, run in both)
     text += f' to {quote("near zero", NEAR_ZERO, "m/s, rad/s", short)}'
-    window = spell((0.0, of.gvc.run.duration))
-    return Judgement(text, grade([times[0] < times[1]]), quote.values, window)
+    return Judgement(text, grade([times[0] < times[1]]), quote.values, _whole(of))
 
 
 def oscillates(of: Evidence) -> Judgement:
@@ -338,8 +333,7 @@ def oscillates(of: Evidence) -> Judgement:
         for i in np.flatnonzero(seen).tolist()
     )
     text = f'total variation, CL against GVC: {text}'
-    window = spell((0.0, of.gvc.run.duration))
-    return Judgement(text, grade(cl[seen] > gvc[seen]), quote.values, window)
+    return Judgement(text, grade(cl[seen] > gvc[seen]), quote.values, _whole(of))
 
 
 def efforts_comparable(of: Evidence) -> Judgement:
@@ -376,7 +370,7 @@ def _pairs(quote: Quotes, gvc: np.ndarray, cl: np.ndarray) -> str:
 
 def _changes(quote: Quotes, change: np.ndarray) -> str:
     """Relative changes (6,) of the RMS inputs."""
-    after = quote('transient', TRANSIENT, 's', short)
+    after = _transient(quote)
     names = [f'change of the RMS of {name}' for name in INPUTS]
     listed = quote.listed(names, 100 * change, '%', percent)
     return f'RMS after {after} s, CL relative to GVC: {listed} % (surge to yaw)'

@@ -79,7 +79,7 @@ def semi_axes(vehicle: Vehicle, data: Mapping[str, Any]) -> tuple[np.ndarray, st
         return np.full(3, radius), 'radius of the sphere of the displaced volume'
     inertia = np.array(body['inertia'], float)
     if body['inertia_reference'] == 'co':
-        inertia = _about_gravity(body['mass'], vehicle.r_G, inertia)
+        inertia = inertia - spread(body['mass'], vehicle.r_G)
     moments = np.diag(inertia)
     squares = 2.5 * (moments.sum() - 2 * moments) / body['mass']
     least = THINNEST**2 * squares.max()
@@ -136,8 +136,9 @@ def _short(bound: float) -> float:
     return float(round(np.trunc(bound * 10.0**decimals) / 10.0**decimals, decimals))
 
 
-def _about_gravity(mass: float, r_G: np.ndarray, inertia: np.ndarray) -> np.ndarray:
-    return inertia - mass * (r_G @ r_G * np.eye(3) - np.outer(r_G, r_G))
+def spread(mass: float, r: np.ndarray) -> np.ndarray:
+    """Moment of inertia (3, 3) in kg m2 of a point mass about the origin of r (3,), in m."""
+    return mass * (r @ r * np.eye(3) - np.outer(r, r))
 
 
 def _stable(vehicle: Vehicle, found: tuple[Any, ...]) -> tuple[Any, ...]:

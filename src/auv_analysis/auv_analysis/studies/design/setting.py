@@ -13,7 +13,7 @@ from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.scaling import REFERENCE, scaled_case1
 from auv_analysis.scenario.scenario import Scenario, load_scenario, scenario_from
 from auv_analysis.simulation.simulate import simulate
-from auv_analysis.studies.design.change import ChangeSpace, disc_mass, normal_of, parts_of
+from auv_analysis.studies.design.change import ChangeSpace, disc_mass, normal_of, parts_of, spread
 from auv_analysis.studies.design.prediction import Sizes, sizes_of
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import check, matrix6, read_text, read_yaml, yaml_text
@@ -86,10 +86,10 @@ def _set_rigid_body(data: dict[str, Any], space: ChangeSpace, x: np.ndarray) -> 
         tensor = np.array(body['inertia'], float)
         tensor = (tensor + tensor.T) / 2
         if about_gravity:
-            tensor += _spread(mass, moved - r_G) + _spread(ballast, at - r_G)
+            tensor += spread(mass, moved - r_G) + spread(ballast, at - r_G)
         else:
-            added = _spread(mass, moved) - _spread(mass, space.vehicle.r_G)
-            tensor += added + _spread(ballast, at)
+            added = spread(mass, moved) - spread(mass, space.vehicle.r_G)
+            tensor += added + spread(ballast, at)
         if ballast or not about_gravity:
             body['inertia'] = tensor.tolist()
     body['mass'], body['center_of_gravity'] = mass + ballast, r_G.tolist()
@@ -102,11 +102,6 @@ def _set_water(data: dict[str, Any], space: ChangeSpace, x: np.ndarray) -> None:
         volume = water['volume'] + foam
         r_B = (water['volume'] * space.vehicle.r_B + foam * x[4:7]) / volume
         water['volume'], water['center_of_buoyancy'] = volume, r_B.tolist()
-
-
-def _spread(mass: float, r: np.ndarray) -> np.ndarray:
-    """Moment of inertia (3, 3) of a point mass about the origin of r."""
-    return mass * (r @ r * np.eye(3) - np.outer(r, r))
 
 
 def _sign(data: dict[str, Any]) -> float:

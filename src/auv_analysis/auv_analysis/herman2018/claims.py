@@ -23,7 +23,7 @@ from auv_analysis.output.arrow import pa
 from auv_analysis.output.text import MISSING, fixed, join
 from auv_analysis.report.digest import TINY, RunDigest, digests
 from auv_analysis.report.document import Block, Section, Sentence, prose
-from auv_analysis.report.results import Column, Shown, Table, described, make_table
+from auv_analysis.report.results import Column, Shown, described, make_table
 from auv_analysis.runs.run import AnyRun, RunInfo
 from auv_analysis.scenario.scenario import Scenario, load_scenario
 from auv_dynamics.plant.disturbance import make_disturbance
@@ -324,21 +324,6 @@ CAPTION = (
 TITLE = 'What the paper reports, and what these runs give'
 
 
-def claims_table(claims: Sequence[Claim]) -> Table:
-    """The paper's claims with our numbers and verdicts."""
-    return make_table('claims', CAPTION, _rows(claims), COLUMNS, anchor='claim', folded=True)
-
-
-def _rows(claims: Sequence[Claim]) -> list[dict[str, Any]]:
-    return [{name: getattr(claim, name) for name in FACTS} for claim in claims]
-
-
-def _deviations(claims: Sequence[Claim]) -> Iterator[Table]:
-    """The claims that these runs do not wholly reproduce."""
-    if rows := _rows([claim for claim in claims if claim.verdict in DECIDED[1:]]):
-        yield make_table('deviations', 'Claims that are not wholly reproduced.', rows, COLUMNS)
-
-
 def claims_part(out: Path, claims: Sequence[Claim], runs: Mapping[str, RunInfo]) -> Part:
     """Section and sentences of a report on the claims; writes `claims.parquet` where there are any.
 
@@ -352,8 +337,12 @@ def claims_part(out: Path, claims: Sequence[Claim], runs: Mapping[str, RunInfo])
     sections = []
     if claims:
         write_claims(out, claims)
-        blocks: list[Block] = [prose('claims', folder=HERE), *_deviations(claims)]
-        blocks.append(claims_table(claims))
+        blocks: list[Block] = [prose('claims', folder=HERE)]
+        rows = [{name: getattr(claim, name) for name in FACTS} for claim in claims]
+        if deviating := [row for row in rows if row['verdict'] in DECIDED[1:]]:
+            caption = 'Claims that are not wholly reproduced.'
+            blocks.append(make_table('deviations', caption, deviating, COLUMNS))
+        blocks.append(make_table('claims', CAPTION, rows, COLUMNS, anchor='claim', folded=True))
         drawn = {name: paper.paper_figures(run) for name, run in runs.items()}
         blocks += [f'{name}: {join(parts)}.' for name, parts in drawn.items() if parts]
         sections.append(Section('claims', TITLE, blocks))

@@ -1,7 +1,7 @@
 """What `auv analyze` is given: bags, samples, folders of results, scenarios; sweeps apart."""
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, NamedTuple, Protocol
@@ -53,11 +53,8 @@ class RunSource:
         """Files that are read, which no result may take the place of."""
         if self.kind == 'bag':
             return files_of(self.path)
-        return [*([self.path] if self.kind == 'samples' else []), *self._inputs]
-
-    @property
-    def _inputs(self) -> Iterable[Path]:
-        return self.scenario.inputs if self.scenario else ()
+        inputs = self.scenario.inputs if self.scenario else ()
+        return [*([self.path] if self.kind == 'samples' else []), *inputs]
 
 
 def is_sweep(argument: str) -> bool:
@@ -95,18 +92,16 @@ def _sources(argument: str) -> list[RunSource]:
     if os.path.isdir(path):
         _refuse_two_meanings(argument, path)
         return _of_folder(path)
-    if os.path.isfile(path):
-        return _of_file(argument, path)
     if path.suffix in YAML:
         return _simulated(load_scenario(path))
+    if os.path.isfile(path):
+        return _of_file(argument, path)
     if len(path.parts) == 1 and not path.suffix:
         return _simulated(load_scenario(_shipped(argument)))
     raise InputError(path, '', EXPECTED, 'no such file or folder')
 
 
 def _of_file(argument: str, path: Path) -> list[RunSource]:
-    if path.suffix in YAML:
-        return _simulated(load_scenario(path))
     if path.suffix == ENDING:
         scenario = _scenario_beside(path)
         scenario.controller(path.stem)

@@ -105,11 +105,8 @@ def _name(recording: 'rerun.RecordingStream', run: AnyRun) -> None:
             if quantity == VELOCITY and run.knows_setpoint:
                 lines.append((SETPOINT, GREY, 1.0))
             for whose, colour, thick in lines:
-                look = rr.SeriesLines(
-                    colors=[list(bytes.fromhex(colour[1:]))],
-                    widths=[thick],
-                    names=[f'{whose} ({units[i // 3]})'],
-                )
+                label = f'{whose} ({units[i // 3]})'
+                look = rr.SeriesLines(colors=[_numbers(colour)], widths=[thick], names=[label])
                 recording.log(_path(quantity, dof, whose), look, static=True)
     axes = rr.TransformAxes3D(1.0)
     recording.log(_path(TRAJECTORY, run.controller, 'vehicle'), axes, static=True)

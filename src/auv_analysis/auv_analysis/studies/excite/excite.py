@@ -34,7 +34,6 @@ from auv_analysis.studies.identify.record import Segment
 from auv_analysis.studies.identify.unknowns import Unknowns, unknowns
 from auv_analysis.studies.optimise import Search, sobol_points
 from auv_dynamics.files.errors import FailedError, InputError
-from auv_dynamics.plant.disturbance import Harmonics
 from auv_dynamics.vehicle.model import Model
 from auv_dynamics.vehicle.vehicle import make_model
 
@@ -56,7 +55,6 @@ class Excited:
     Attributes
     ----------
     request : what was asked for
-    wave : the multisine, of wrench or of set-points
     scenario : contents of its file
     motion : of the prior, then of vehicles drawn around it
     used : (V, 5) share of each bound that they use
@@ -67,7 +65,6 @@ class Excited:
     """
 
     request: Request
-    wave: Harmonics
     scenario: dict[str, Any]
     motion: Motion
     used: np.ndarray
@@ -136,9 +133,7 @@ def excite(request: Request, tick: Tick = lambda text, share: None) -> Excited:
     _check(request, used)
     predicted = prediction(request, motion.commands[0, 0], motion.states[0, 0])
     data = scenario_of(request, wave.part(0))
-    return Excited(
-        request, wave.part(0), data, motion, used, predicted, of_case1(request), PHASES + count
-    )
+    return Excited(request, data, motion, used, predicted, of_case1(request), PHASES + count)
 
 
 def within(

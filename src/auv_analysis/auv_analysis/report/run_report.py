@@ -288,7 +288,13 @@ def findings(runs: Mapping[str, RunDigest], summaries: Summaries) -> list[Senten
     found += [Sentence(text, 'experiment') for text in namesakes([*runs.values()])]
     found += [Sentence(_settling(n, run, summaries[n]), metrics) for n, run in runs.items()]
     if not ranked:
-        found += [Sentence(_late_errors(summaries), metrics), Sentence(_inputs(summaries), metrics)]
+        late = {n: s['velocity_error']['max_after_2s'] or [None] * 6 for n, s in summaries.items()}
+        commands = {n: s['effort']['max'] for n, s in summaries.items()}
+        texts = (
+            _reached('After 2 s the errors reach at most', late, VELOCITY, 2),
+            _reached('The largest commands are', commands, WRENCH, 3),
+        )
+        found += [Sentence(text, metrics) for text in texts]
     found += [
         Sentence(f'Under {name} {"; ".join(remarks)}.', metrics)
         for name, run in runs.items()
@@ -352,31 +358,16 @@ def _is_noise(run: RunDigest, i: int) -> bool:
     return measured and abs(late.mean[i]) <= band[i] and late.path[i] >= RESTLESS * late.span[i]
 
 
-def _late_errors(summaries: Summaries) -> str:
+def _reached(
+    words: str, values: Mapping[str, Sequence[float | None]], units: Sequence[str], digits: int
+) -> str:
+    """Largest linear and angular value of each run with its axis, as far as they are known."""
     parts = []
-    for name, summary in summaries.items():
-        late = summary['velocity_error']['max_after_2s']
-        reached = _halves(late or [None] * 6, VELOCITY, 2)
-        if reached:
-            parts.append(f'{reached} under {name}')
-    return f'After 2 s the errors reach at most {"; ".join(parts)}.' if parts else ''
-
-
-def _inputs(summaries: Summaries) -> str:
-    parts = []
-    for name, summary in summaries.items():
-        reached = _halves(summary['effort']['max'], WRENCH, 3)
-        if reached:
-            parts.append(f'{reached} under {name}')
-    return f'The largest commands are {"; ".join(parts)}.' if parts else ''
-
-
-def _halves(values: Sequence[float | None], units: Sequence[str], digits: int) -> str:
-    """Largest of the linear and of the angular values with its axis, as far as they are known."""
-    found = (largest(values, members) for members in GROUPS)
-    return join(
-        [f'{number(values[i], digits)} {units[i // 3]} ({DOFS[i]})' for i in found if i is not None]
-    )
+    for name, six in values.items():
+        found = [i for members in GROUPS if (i := largest(six, members)) is not None]
+        texts = [f'{number(six[i], digits)} {units[i // 3]} ({DOFS[i]})' for i in found]
+        parts += [f'{join(texts)} under {name}'] if texts else []
+    return f'{words} {"; ".join(parts)}.' if parts else ''
 
 
 def _applied(runs: Mapping[str, RunDigest]) -> str:

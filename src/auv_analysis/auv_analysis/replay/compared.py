@@ -26,7 +26,6 @@ REAL_TIME = 0.05  # the bag does not say when each message arrived
 UNCHECKED = 'reproduction not checked'
 UNNAMED = f'{UNCHECKED}: the bag does not name its law, or it is not imported'
 NAME = 'open_loop_wrench'  # of the plot
-ORDER = (0, 3, 1, 4, 2, 5)  # forces left, moments right
 Ask = Callable[[RecordedLoop, str, dict[str, Any]], OpenLoop]
 
 
@@ -194,14 +193,14 @@ def draw(document: Mapping[str, Any], both: Compared, folder: Path) -> Path:
 
 def _figure(document: Mapping[str, Any], both: Compared) -> tuple[Figure, str, str]:
     from auv_analysis.metrics.quantities import SIGNALS
-    from auv_analysis.report.plots import COLOURS, DASHES, new_figure
+    from auv_analysis.report.plots import COLOURS, DASHES
     from auv_analysis.report.traces import FEW, thinned
+    from auv_analysis.report.wrench_plots import six_panels
 
     law, verdict = document['answered']['law'], document['reproduction']
     names = f'recorded ({document["recorded"]["law"] or "unknown law"})', f'{law}, open loop'
-    figure = new_figure(5.2)
-    panels = figure.subplots(3, 2, sharex=True)
-    for axes, i in zip(panels.flat, ORDER, strict=True):
+    figure, panels = six_panels(5.2)
+    for i, axes in enumerate(panels):
         pairs = zip(names, (both.recorded, both.answered), DASHES, strict=False)
         for k, (name, wrench, dash) in enumerate(pairs):
             t, tau = both.t, wrench[:, i]
@@ -209,9 +208,7 @@ def _figure(document: Mapping[str, Any], both: Compared) -> tuple[Figure, str, s
                 t, tau = thinned(t, tau)
             axes.plot(t, tau, color=COLOURS[k], linestyle=dash, label=name)
         axes.set_ylabel(f'{DOFS[i]}: {SIGNALS["tau"].axis([i])}')
-    for axes in panels[-1]:
-        axes.set_xlabel('$t$ (s)')
-    panels[0, 1].legend(loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=2)
+    panels[3].legend(loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=2)
     said = capital(verdict)
     figure.suptitle(said, fontsize='small')
     title = f'What {names[1]} would have commanded'

@@ -19,7 +19,7 @@ from auv_analysis.metrics.fault_response import (
     responses,
     write_responses,
 )
-from auv_analysis.metrics.quantities import SIGNALS, mathtext
+from auv_analysis.metrics.quantities import SIGNALS
 from auv_analysis.metrics.summary import BAND_TEXT, TRANSIENT
 from auv_analysis.output.text import Maths, capital, join, number
 from auv_analysis.report import plots
@@ -120,9 +120,7 @@ def _drawn(runs: Mapping[str, RunDigest]) -> Drawn:
     bands = common_bands(runs)
     for i, axes in enumerate(panels):
         _panel(axes, runs, i, bands[i])
-        axes.set_ylabel(
-            f'{mathtext(SIGNALS["error"].components[i])} ({SIGNALS["error"].unit_of(i)})'
-        )
+        axes.set_ylabel(SIGNALS['error'].axis([i]))
         plots.letter(axes, i, DOFS[i])
     panels[-1].set_xlabel('$t$ (s)')
     handles = [Line2D([], [], **_look(n)) for n in range(len(runs))]

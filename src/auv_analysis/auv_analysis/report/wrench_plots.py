@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from auv_analysis.metrics.quantities import SIGNALS, WRENCH, mathtext
+from auv_analysis.metrics.quantities import SIGNALS, WRENCH
 from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.output.text import join, largest, number
 from auv_analysis.report import plots
@@ -21,6 +21,15 @@ BEYOND = 3.0  # times what else is to be seen: a command that is cut off and tol
 ROOM = 1.25  # of the axis above what it shows
 COMMAND: dict[str, Any] = {'color': '#8a8a8a', 'linewidth': 0.8, 'linestyle': '-'}
 LIMIT: dict[str, Any] = {'color': 'black', 'linewidth': 0.9, 'linestyle': (0, (1, 1.6))}
+
+
+def six_panels(height: float) -> tuple[Figure, list[Axes]]:
+    """Figure of a height in inches, a panel over time per degree of freedom, linear ones left."""
+    figure = plots.new_figure(height)
+    panels = figure.subplots(3, 2, sharex=True)
+    for axes in panels[-1]:
+        axes.set_xlabel('$t$ (s)')
+    return figure, list(panels.T.flat)
 
 
 def leave_out(axes: Axes) -> None:
@@ -43,20 +52,16 @@ def applied_figure(run: RunDigest, limit: np.ndarray | None) -> tuple[Figure, st
 
     """
     title = f'Input, {run.controller}'
-    figure = plots.new_figure(5.6)
-    panels = figure.subplots(3, 2, sharex=True)
+    figure, panels = six_panels(5.6)
     cut, missed = [], []
-    for i, dof in enumerate(DOFS):
-        axes = panels[i % 3, i // 3]
+    for i, (axes, dof) in enumerate(zip(panels, DOFS, strict=True)):
         bound = None if limit is None else float(limit[i])
         if _panel(axes, run, i, bound):
             cut.append(dof)
         if run.missed[i]:
             missed.append(dof)
-        axes.set_ylabel(f'{mathtext(SIGNALS["tau"].components[i])} ({SIGNALS["tau"].unit_of(i)})')
+        axes.set_ylabel(SIGNALS['tau'].axis([i]))
         plots.letter(axes, i, dof)
-    for axes in panels[-1]:
-        axes.set_xlabel('$t$ (s)')
     figure.legend(*_applied_key(limit), loc='outside upper right', ncols=3, handlelength=2.4)
     return figure, title, _applied_caption(title, run, limit, cut, missed)
 
@@ -251,11 +256,9 @@ def estimate_figure(run: RunDigest, kind: str) -> Drawn:
     title = f'{SIGNALS[kind].label.capitalize()}, {run.controller}'
     if len(plots.unrecorded(run.part(kind))) == 6:
         return None, title, f'{title}: every row of (1) needs what was not recorded.'
-    figure = plots.new_figure(5.6)
-    panels = figure.subplots(3, 2, sharex=True)
+    figure, panels = six_panels(5.6)
     acted = '' if kind == 'required_wrench' else 'applied' if run.acting else 'tau'
-    for i, dof in enumerate(DOFS):
-        axes = panels[i % 3, i // 3]
+    for i, (axes, dof) in enumerate(zip(panels, DOFS, strict=True)):
         plots.letter(axes, i, dof)
         if dof in plots.unrecorded(run.part(kind)):
             leave_out(axes)
@@ -269,9 +272,7 @@ def estimate_figure(run: RunDigest, kind: str) -> Drawn:
         plots.shade(axes, run)
         if acted:
             _cut(axes, run, acted, i)
-        axes.set_ylabel(f'{mathtext(quantity.components[i])} ({quantity.unit_of(i)})')
-    for axes in panels[-1]:
-        axes.set_xlabel('$t$ (s)')
+        axes.set_ylabel(quantity.axis([i]))
     handles = {
         f'{quantity.symbol}, estimated': Line2D([], [], color='black'),
         'two standard errors': Patch(color=GREY, alpha=BAND),

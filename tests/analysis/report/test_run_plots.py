@@ -488,9 +488,14 @@ def _text(value: float) -> str:
     return f'{value:,.{decimals}f}'.replace(',', '\u202f').replace('-', '−')
 
 
+def _faults(runs, folder):
+    drawn = {'faults': lambda: fault_figure(digests(runs))}
+    return plots.save_figures(folder, drawn)['faults']
+
+
 def test_errors_under_faults_are_those_of_their_runs(runs, tmp_path) -> None:
     with artists.captured() as found:
-        record = fault_figure(digests(runs), tmp_path)
+        record = _faults(runs, tmp_path)
     figure = found['faults']
     for i, axes in enumerate(figure.axes):
         shown = named(axes, figure.legends[0])
@@ -515,14 +520,14 @@ def test_errors_under_faults_are_those_of_their_runs(runs, tmp_path) -> None:
 def test_errors_under_faults_are_seen_to_the_end_of_the_longest_run(runs, tmp_path) -> None:
     one, two = runs['one'], runs['two']
     with artists.captured() as found:
-        fault_figure(digests({'one': one, 'two': two.part(two.t < START + 6.0)}), tmp_path)
+        _faults({'one': one, 'two': two.part(two.t < START + 6.0)}, tmp_path)
     assert {axes.get_xlim() for axes in found['faults'].axes} == {(START, START + 12.0)}
 
 
 def test_settling_bands_stand_under_faults_where_the_runs_share_them(runs, tmp_path) -> None:
     two = {name: runs[name] for name in ('one', 'two')}
     with artists.captured() as found:
-        fault_figure(digests(two), tmp_path)
+        _faults(two, tmp_path)
     for i, axes in enumerate(found['faults'].axes):
         band = max(0.02 * np.abs(runs['two'].nu_d[:, i]).max(), 0.005)
         assert levels(axes) == pytest.approx([-band, band])

@@ -1,12 +1,12 @@
 """Faults in the report: a table each, one plot and a sentence per controller over all of them."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
@@ -25,7 +25,7 @@ from auv_analysis.output.text import Maths, capital, join, number
 from auv_analysis.report import plots
 from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.document import Block, Section, Sentence
-from auv_analysis.report.plots import DASHES, GREY, RUNS, Drawn, FigureRecord, save_figures
+from auv_analysis.report.plots import DASHES, GREY, RUNS, Drawn, save_figures
 from auv_analysis.report.results import Shown, Table, described, view_of_file
 from auv_analysis.report.run_plots import common_bands, left_out
 from auv_analysis.runs.run import AnyRun
@@ -59,8 +59,8 @@ def fault_part(out: Path, runs: Mapping[str, AnyRun]) -> tuple[Section, list[Sen
     blocks: list[Block] = [NO_ERROR]
     if all(found.values()):
         write_responses(out, found)
-        figure = fault_figure(digests(runs), out / 'figures')
-        blocks = [ABOUT, figure, *fault_tables(found)]
+        drawn = {'faults': partial(fault_figure, digests(runs))}
+        blocks = [ABOUT, *save_figures(out / 'figures', drawn).values(), *fault_tables(found)]
     else:
         found = {}
     return Section('faults', TITLE, blocks), [*fault_overview(found)]
@@ -80,16 +80,12 @@ def fault_overview(found: Found) -> Iterator[Sentence]:
         open_ones = {n.mark.number for n in several if n.until is not None and n.recovery is None}
         text = f'The fault that disturbs {name} most is number {worst.mark.number} '
         text += f'({worst.mark.label}, {worst.mark.times}): up to {number(worst.peak[1], 2)} '
-        text += f'{_unit(worst)} in {worst.dof}'
+        text += f'{"rad/s" if worst.dof in DOFS[3:] else "m/s"} in {worst.dof}'
         if ended:
             back = len(ended) - len(open_ones)
             text += f'; after {back or "none"} of the {len(ended)} that end every error comes back '
             text += 'into its settling band before anything else changes'
         yield Sentence(f'{text}.', 'faults')
-
-
-def _unit(response: FaultResponse) -> str:
-    return 'rad/s' if response.dof in DOFS[3:] else 'm/s'
 
 
 def _rise(response: FaultResponse) -> float:
@@ -101,20 +97,9 @@ def _rise(response: FaultResponse) -> float:
 ROOM = 1.3  # of the axis above what it shows, for the numbers of the faults
 
 
-def fault_figure(runs: Mapping[str, RunDigest], folder: Path) -> FigureRecord:
-    """Draw and save `faults.png` and `.pdf`.
-
-    Parameters
-    ----------
-    runs : of one scenario with faults, each with a set-point
-    folder : of the figures
-
-    """
-    return save_figures(folder, {'faults': lambda: _drawn(runs)})['faults']
-
-
-def _drawn(runs: Mapping[str, RunDigest]) -> Drawn:
-    figure: Figure = plots.new_figure(7.2)
+def fault_figure(runs: Mapping[str, RunDigest]) -> Drawn:
+    """Velocity errors of runs of one scenario with faults, each with a set-point."""
+    figure = plots.new_figure(7.2)
     panels = figure.subplots(6, 1, sharex=True)
     first = next(iter(runs.values()))
     bands = common_bands(runs)

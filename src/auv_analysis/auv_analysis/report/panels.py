@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from auv_analysis.metrics.quantities import SIGNALS, Quantity
+from auv_analysis.metrics.quantities import SIGNALS
 from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.report.digest import ESTIMATES, RunDigest
 from auv_analysis.report.plots import COLOURS, GREY, moving, unrecorded
@@ -304,12 +304,8 @@ def _six_signals(signal: str, runs: Mapping[str, RunDigest]) -> Iterator[TimePan
         ]
         if curves:
             title = f'{quantity.label.capitalize()}, {group}'
-            label = _label(quantity, members[0])
+            label = f'{quantity.label} ({quantity.unit_of(members[0])})'
             yield TimePanel(f'{signal}-{group}', title, label, tuple(curves))
-
-
-def _label(quantity: Quantity, component: int) -> str:
-    return f'{quantity.label} ({quantity.unit_of(component)})'
 
 
 def _certificates(runs: Mapping[str, RunDigest]) -> Iterator[TimePanel]:

@@ -375,24 +375,20 @@ def energy_shares(runs: Mapping[str, RunDigest]) -> Drawn:
             axes.scatter(early[i], facecolors=COLOURS[i], linewidths=1.0, zorder=4, **place)
         both = np.append(early, whole)
         smallest = min([smallest, *both[both > 0]])
-        handles.append(_mark(marker, run.controller))
+        handles.append(Line2D([], [], linestyle='', marker=marker, color='black', markersize=5))
     left = max(10.0 ** np.floor(np.log10(smallest) - 0.3), SMALLEST_SHARE)
     plots.logarithmic(axes, 'x')
     axes.set(xlim=(left, 160.0), ylim=(5.5, -0.5), yticks=range(6))
     axes.set_yticklabels([f'{XI[i]} {DOFS[i]}' for i in range(6)])
     axes.tick_params(axis='y', length=0)
     axes.set_xlabel('share of the mean kinetic energy (%)')
-    axes.legend(handles=handles, loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=rows)
+    axes.legend(handles, [*runs], loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=rows)
     title = 'Shares of kinetic energy'
     caption = (
         f'{title}: mean of the samples of 0 to {end:g} s (filled) and of the whole run '
         '(open), logarithmic axis.'
     )
     return figure, title, caption
-
-
-def _mark(marker: str, label: str, colour: str = 'black') -> Line2D:
-    return Line2D([], [], linestyle='', marker=marker, color=colour, markersize=5, label=label)
 
 
 def _stack(axes: Axes, run: RunDigest) -> None:

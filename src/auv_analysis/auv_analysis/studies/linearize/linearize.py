@@ -193,20 +193,16 @@ def plant_jacobian(
     if vehicle.lift is not None:
         dragging -= abs(nu[0]) * vehicle.lift
         dragging[:, 0] += np.sign(nu[0]) * vehicle.lift @ nu
-    restoring = np.stack([_quarter_turns(vehicle, eta, axis) for axis in (3, 4)], axis=1)
+    turns = np.pi / 2 * np.eye(6)[3:5]
+    restoring = np.stack([vehicle.g(eta + turn) - vehicle.g(eta - turn) for turn in turns], axis=1)
     A = np.zeros((8, 8))
     A[ATTITUDE, ATTITUDE] = _attitude_slope(eta, kinematics(eta) @ nu)
     A[ATTITUDE, NU] = kinematics(eta)[3:5]
-    A[NU, ATTITUDE] = -np.linalg.solve(vehicle.M, restoring)
+    A[NU, ATTITUDE] = -np.linalg.solve(vehicle.M, restoring / 2)
     A[NU, NU] = -np.linalg.solve(vehicle.M, turning + dragging)
     B = np.zeros((8, 6))
     B[NU] = np.linalg.inv(vehicle.M)
     return A, B
-
-
-def _quarter_turns(vehicle: Vehicle, eta: np.ndarray, axis: int) -> np.ndarray:
-    turn = np.pi / 2 * np.eye(6)[axis]
-    return (vehicle.g(eta + turn) - vehicle.g(eta - turn)) / 2
 
 
 def _attitude_slope(eta: np.ndarray, rate: np.ndarray) -> np.ndarray:

@@ -251,18 +251,14 @@ def gain_factors(scenario: Scenario, controller: str) -> GainFactors:
     given: dict[str, Any] = scenario.gain_values(controller)
     law = type(scenario.gains(controller))
     defaults = getattr(law, '_field_defaults', {})
-    missing = {name: _plain(value) for name, value in defaults.items() if name not in given}
-    if missing:
-        written = {gain_path(controller, name): value for name, value in missing.items()}
-        scenario = changed_scenario(scenario, written)
+    missing = {name: value for name, value in defaults.items() if name not in given}
     values = {name: np.asarray(value, float) for name, value in {**given, **missing}.items()}
+    if missing:
+        written = {gain_path(controller, name): values[name].tolist() for name in missing}
+        scenario = changed_scenario(scenario, written)
     moved = {name: values[name] for name in law._fields if np.any(values[name] != 0.0)}
     still = {name: 'zero: a factor leaves it as it is' for name in values if name not in moved}
     return GainFactors(scenario, controller, moved, still)
-
-
-def _plain(value: Any) -> Any:
-    return np.asarray(value, float).tolist()
 
 
 def sensitivity(

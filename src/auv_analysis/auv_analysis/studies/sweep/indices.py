@@ -1,7 +1,7 @@
 """Sensitivity indices after Sobol' and Morris: of a campaign, and of a design of one's own."""
 
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
@@ -161,7 +161,9 @@ def indices(sweep: Sweep, entry: Designed, values: np.ndarray, measure: Measure)
             names: Row = {'method': 'sobol' if entry.kind == 'saltelli' else 'morris'}
             names |= {'controller': controller, 'figure': measure.name, 'unit': measure.unit}
             names |= {'case': case, 'points': len(used), 'of': int(entry.spec['count'])}
-            yield from (names | row for row in _quiet(analyze, entry, used, whole))
+            with np.errstate(all='ignore'):
+                found = list(analyze(entry, used, whole))
+            yield from (names | row for row in found)
 
 
 def _rows(sweep: Sweep, entry: Designed, controller: int, other: int) -> np.ndarray:
@@ -191,11 +193,6 @@ def failing(sweep: Sweep, entry: Designed) -> Iterator[str]:
                 f'indices of {", ".join(entry.paths)} under {controller} are of the part of the '
                 f'design where no row failed: {failed} did'
             )
-
-
-def _quiet(analyze: Callable[..., Iterator[Row]], *arguments: Any) -> list[Row]:
-    with np.errstate(all='ignore'):
-        return list(analyze(*arguments))
 
 
 def _sobol(entry: Designed, Y: np.ndarray, whole: np.ndarray) -> Iterator[Row]:

@@ -92,10 +92,10 @@ def style() -> AbstractContextManager[None]:
     return matplotlib.style.context(['default', STYLE])
 
 
-def new_figure(height: float, width: float = WIDTH) -> Figure:
-    """Empty figure of a size in inches, without pyplot."""
+def new_figure(height: float) -> Figure:
+    """Empty figure of a height in inches, as wide as the text of a page, without pyplot."""
     layout = ConstrainedLayoutEngine(w_pad=0.05, h_pad=0.04, wspace=0.03, hspace=0.03)
-    figure = Figure(figsize=(width, height), layout=layout)
+    figure = Figure(figsize=(WIDTH, height), layout=layout)
     FigureCanvasAgg(figure)
     return figure
 
@@ -410,18 +410,17 @@ class HeatMap:
         return Normalize(0.0, high)
 
 
-def heat_map(rows: Sequence[str], grids: Sequence[HeatMap], width: float = WIDTH) -> Figure:
+def heat_map(rows: Sequence[str], grids: Sequence[HeatMap]) -> Figure:
     """Grids that share their rows, side by side.
 
     Parameters
     ----------
     rows : names (r,)
     grids : at least one
-    width : in
 
     """
     height = min(MARGIN + ROW * len(rows), TALLEST)
-    figure = new_figure(height, width)
+    figure = new_figure(height)
     ratios = [len(grid.columns) for grid in grids]
     panels = figure.subplots(1, len(grids), squeeze=False, width_ratios=ratios)[0]
     size = min(8.0, 72 * (height - MARGIN) / max(len(rows), 1) * 0.85)

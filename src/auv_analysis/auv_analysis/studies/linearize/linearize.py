@@ -128,12 +128,9 @@ STEP = 1e-5  # of m/s, rad/s, rad: rounding leaves ten digits of a law's gains
 
 
 def jacobian(
-    function: Callable[[np.ndarray], np.ndarray],
-    at: np.ndarray,
-    step: float = STEP,
-    count: int | None = None,
+    function: Callable[[np.ndarray], np.ndarray], at: np.ndarray, count: int | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Central differences over step, step/2 and step/4, extrapolated linearly to no step at all.
+    """Central differences over `STEP`, its half and quarter, extrapolated linearly to no step.
 
     Exact but for rounding where the function is quadratic on both sides of `at`, and so for every
     shipped law: central differences of abs(x) x are off by a multiple of the step at x = 0, which
@@ -143,7 +140,6 @@ def jacobian(
     ----------
     function : (K, n) to (K, m), points to values
     at : (n,) where
-    step : the largest one
     count : k, of the first elements of `at` alone; None: all n
 
     Returns
@@ -152,7 +148,7 @@ def jacobian(
     error : (m, k) by how much the last two extrapolations differ
 
     """
-    steps = np.array([step, step / 2, step / 4])
+    steps = np.array([STEP, STEP / 2, STEP / 4])
     moves = steps[:, None, None] * np.eye(len(at))[:count]  # (3, k, n)
     values = function(np.stack([at + moves, at - moves]).reshape(-1, len(at)))
     ahead, back = values.reshape(2, 3, moves.shape[1], -1)
@@ -261,7 +257,7 @@ class LawAt:
 
     def jacobian(self, y: np.ndarray, count: int | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives (6 + m, 20 + m) of the answer, and their errors; by `count` of y alone."""
-        return jacobian(self.answers, y, count=count)
+        return jacobian(self.answers, y, count)
 
 
 def holding_point(law: LawAt, plant: Vehicle, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:

@@ -291,7 +291,7 @@ def _still(records: Sequence[Record], noise: np.ndarray, u: Unknowns) -> list[En
 
     What moves them then is the noise itself, through the controller: fits to that are biased.
     """
-    moved = _rms([_centred(record) for record in records])
+    moved = _rms([nu - nu.mean(axis=0) for nu in map(Record.evenly, records)])
     known = np.any([record.known for record in records], axis=0)
     still = known & (moved < MOVING * np.nan_to_num(noise[:6]))
     inertial = ('M', 'D_linear', 'D_quadratic')
@@ -333,11 +333,6 @@ def _trusting(u: Unknowns, known: np.ndarray) -> Unknowns:
         for e in u.entries
     )  # fmt: skip
     return replace(u, entries=tuple(entries))
-
-
-def _centred(record: Record) -> np.ndarray:
-    nu = np.nan_to_num(record.states(np.arange(record.start, record.end, 0.1))[:, 4:])
-    return nu - nu.mean(axis=0)
 
 
 def _rms(arrays: Sequence[np.ndarray]) -> np.ndarray:

@@ -50,18 +50,12 @@ def check_rates(record: Record) -> None:
 def excitation(records: Sequence[Record]) -> list[str]:
     """What the commands lack, a sentence each."""
     shares = [
-        _in_one_line(signal)
-        for record in records
-        for signal in (record.command, np.nan_to_num(_evenly(record)))
+        _in_one_line(signal) for record in records for signal in (record.command, record.evenly())
     ]
     if max(shares, default=0.0) > ALONE:
         return [f'{100 * max(shares):.0f} % of the power of the motion lie at one frequency: drag '
                 'and inertia can hardly be told apart']  # fmt: skip
     return []
-
-
-def _evenly(record: Record) -> np.ndarray:
-    return record.states(np.arange(record.start, record.end, 0.1))[:, 4:]
 
 
 def _in_one_line(signal: np.ndarray) -> float:

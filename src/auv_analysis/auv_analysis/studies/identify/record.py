@@ -74,6 +74,10 @@ class Record:
             nu[:, i] = smoothed(self.velocity_t[there], self.velocity[there, i : i + 1], t)[:, 0]
         return np.concatenate([q / np.linalg.norm(q, axis=1, keepdims=True), nu], axis=1)
 
+    def evenly(self) -> np.ndarray:
+        """Velocity (k, 6) at even times; zero where it is not measured."""
+        return np.nan_to_num(self.states(np.arange(self.start, self.end, 0.1))[:, 4:])
+
     def noise(self) -> np.ndarray:
         """(9,) standard deviation of white noise: velocity, then attitude in rad; NaN: unknown."""
         found = np.full(9, np.nan)

@@ -28,7 +28,7 @@ class FaultResponse:
     Attributes
     ----------
     mark : the fault
-    controller, law, dof : of the run
+    law, dof : of the run
     windows : times of `rms` and `effort`, s
     rms : of nu_d - nu before, during and after, m/s or rad/s
     peak : largest absolute error before, during and after
@@ -41,7 +41,6 @@ class FaultResponse:
     """
 
     mark: Mark
-    controller: str
     law: str
     dof: str
     windows: tuple[Window, Window, Window]
@@ -102,7 +101,6 @@ def responses(run: AnyRun) -> list[FaultResponse]:
             found.append(
                 FaultResponse(
                     mark,
-                    run.controller,
                     run.law,
                     dof,
                     windows[mark],

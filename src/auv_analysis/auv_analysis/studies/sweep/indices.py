@@ -13,11 +13,11 @@ from auv_analysis.output.new_files import known
 from auv_analysis.studies.sweep.dataset import Sweep
 from auv_analysis.studies.sweep.variation import (
     LEVELS,
+    Drawn,
     Group,
     Saltelli,
     cube,
     kind_of,
-    make_design,
     make_group,
     morris,
 )
@@ -86,17 +86,15 @@ def designed(sweep: Sweep) -> tuple[list[Designed], list[str]]:
 
 
 def _designed(sweep: Sweep, groups: list[Group], number: int, spec: dict[str, Any]) -> Designed:
-    sizes = [group.size for group in groups]
+    group, sizes = groups[number], [group.size for group in groups]
     inner = int(np.prod(sizes[number + 1 :], dtype=np.int64))
     positions = sweep.index // inner % sizes[number]
     outer = sweep.index // (inner * sizes[number])
     kind = kind_of(spec)
     paths = list(spec[kind])
     points = None
-    if kind == 'morris':
-        options = {key: int(value) for key, value in spec.items() if key != kind}
-        design = make_design(kind, paths, options, sweep.campaign['seed'], number)
-        points = design.at(np.arange(design.size))
+    if kind == 'morris' and isinstance(group, Drawn):
+        points = group.design.at(np.arange(group.size))
     step = sizes[number] // int(spec['count'])
     others = outer * inner + sweep.index % inner
     cases = _cases(sweep, others, paths, sweep.manifest['rollouts'] // sizes[number])

@@ -379,11 +379,11 @@ class Drawn:
     def __init__(
         self, quantiles: Mapping[str, Callable[[np.ndarray], Values]], design: SamplingPlan
     ):
-        self._quantiles, self._design, self.size = quantiles, design, design.size
+        self._quantiles, self.design, self.size = quantiles, design, design.size
 
     def at(self, positions: np.ndarray) -> dict[str, Values]:
         """See `Group`."""
-        points = self._design.at(positions)
+        points = self.design.at(positions)
         return {path: q(points[:, i]) for i, (path, q) in enumerate(self._quantiles.items())}
 
 

@@ -81,10 +81,11 @@ class SweepFolder:
             write(self.folder / SWEEP, json.dumps(stored, indent=1).encode())
         self.block = stored.pop('block')
         _refuse_other(self.folder, stored, manifest)
-        _clear_unfinished(self.folder)
-        _write_inputs(self.folder, campaign)
         self.data.mkdir(exist_ok=True)
-        _clear_unfinished(self.data)
+        for folder in (self.folder, self.data):
+            for unfinished in folder.glob(f'.*{UNFINISHED}'):
+                unfinished.unlink()
+        _write_inputs(self.folder, campaign)
 
     def finished(self, columns: list[str]) -> Iterator[tuple[int, 'pa.Table']]:
         """Number and some columns of each finished block; what cannot be read is not finished."""
@@ -117,12 +118,6 @@ class SweepFolder:
         options = {'compression': 'zstd', 'use_dictionary': words, 'write_statistics': False}
         pq.write_table(table, sink, **options)  # what is asked of a sweep is asked of all its rows
         write(self.data / f'part-{block:08d}.parquet', sink.getvalue())
-
-
-def _clear_unfinished(folder: Path) -> None:
-    if folder.is_dir():
-        for entry in folder.glob(f'.*{UNFINISHED}'):
-            entry.unlink()
 
 
 def _manifest(campaign: Campaign) -> dict[str, Any]:

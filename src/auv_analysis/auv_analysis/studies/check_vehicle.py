@@ -21,7 +21,7 @@ from auv_analysis.report.results import (
     terminal,
 )
 from auv_analysis.scenario.scaling import TOP_SPEED
-from auv_analysis.studies.linearize.linearize import linearize
+from auv_analysis.studies.linearize.linearize import ATTITUDE, NU, linearize, plant_jacobian
 from auv_analysis.studies.linearize.modes import FOUR, POLES, modes, pole_rows
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.thruster_curves import source_of
@@ -137,15 +137,9 @@ def _pendulum(vehicle: Vehicle) -> dict[str, dict[str, float | None]]:
 
     The eigenvalue is the square of the natural frequency; negative: the vehicle turns over.
     """
-    small = 1e-6
-
-    def g(phi: float, theta: float) -> np.ndarray:
-        return vehicle.g(np.array([0.0, 0.0, 0.0, phi, theta, 0.0]))
-
-    slope = np.stack([g(small, 0.0) - g(-small, 0.0), g(0.0, small) - g(0.0, -small)], axis=1) / (
-        2 * small
-    )
-    values, modes = np.linalg.eig(np.linalg.solve(vehicle.M, slope)[3:5])
+    level = np.zeros(6)
+    A, _ = plant_jacobian(vehicle, level, level)
+    values, modes = np.linalg.eig(-A[NU, ATTITUDE][3:5])
     named = {}
     for dof, i in zip(('roll', 'pitch'), np.argsort(-np.abs(modes[0])), strict=True):
         value = float(values[i].real)

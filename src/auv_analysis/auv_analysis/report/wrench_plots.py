@@ -117,9 +117,12 @@ def _applied_caption(
 
 
 IDENTITY, BOUND, MEASURED = '#56B4E9', '#D55E00', '#1a1a1a'
-RATES_APART = (
-    10.0  # ratio of a largest value to what else is to be seen, from which it is logarithmic
-)
+RATES: dict[str, dict[str, Any]] = {
+    'bound': {'color': BOUND, 'linestyle': (0, (4, 1.4)), 'linewidth': 1.1},
+    'identity': {'color': IDENTITY, 'linestyle': '-', 'linewidth': 3.0},
+    'L_dot': {'color': MEASURED, 'linestyle': '-', 'linewidth': 0.9},
+}
+RATES_APART = 10.0  # ratio of a largest value to what else is to be seen: logarithmic from there on
 DECADES = 5  # of a symmetric logarithmic axis, from its linear part to its end
 
 
@@ -189,7 +192,7 @@ def _energy(axes: Axes, run: RunDigest, parts: Iterable[str]) -> None:
 def _rates(axes: Axes, run: RunDigest, part: str) -> bool:
     """Lines of (28), (26), the measured derivative; whether the axis is partly logarithmic."""
     axes.axhline(0.0, color=plots.GREY, linewidth=0.6)
-    for name, look in zip(('bound', 'identity', 'L_dot'), _rate_looks(), strict=True):
+    for name, look in RATES.items():
         axes.plot(*run.line(name, 0, part), **look)
     _increasing(axes, run, part)
     (t, identity), (_, bound) = (run.line(name, 0, part) for name in ('identity', 'bound'))
@@ -219,16 +222,8 @@ def _increasing(axes: Axes, run: RunDigest, part: str) -> None:
     )  # fmt: skip
 
 
-def _rate_looks() -> tuple[dict[str, Any], ...]:
-    return (
-        {'color': BOUND, 'linestyle': (0, (4, 1.4)), 'linewidth': 1.1},
-        {'color': IDENTITY, 'linestyle': '-', 'linewidth': 3.0},
-        {'color': MEASURED, 'linestyle': '-', 'linewidth': 0.9},
-    )
-
-
 def _rates_key(axes: Axes) -> None:
-    handles = [Line2D([], [], **look) for look in reversed(_rate_looks())]
+    handles = [Line2D([], [], **look) for look in reversed(RATES.values())]
     axes.legend(
         handles,
         ['measured', 'identity (26)', 'bound (28)'],

@@ -33,14 +33,6 @@ from auv_analysis.runs.run import AnyRun
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.model import control_model
 
-DRAWN = {  # kind of figure -> signal of `RunDigest`
-    'errors': 'error',
-    'lumped_error': 'lumped_error',
-    'uncertainty': 'F',
-    'inputs': 'tau',
-    'delta_xi': 'delta_xi',
-    'delta_pi': 'delta_pi',
-}
 SYMBOLS = {'delta_xi': 'Δξ', 'delta_pi': 'Δπ'}
 
 
@@ -98,14 +90,13 @@ def reference(runs: Mapping[str, RunDigest]) -> RunDigest:
     return min(runs.values(), key=lambda run: run.law != 'gvc')
 
 
-def six_signals(kind: str, run: RunDigest, quantity: Quantity, zeros: Sequence[str] = ()) -> Drawn:
+def six_signals(signal: str, run: RunDigest, zeros: Sequence[str] = ()) -> Drawn:
     """Linear and angular signals of a run, the first phase apart where it dwarfs the rest.
 
     Parameters
     ----------
-    kind : of `DRAWN`
+    signal : of `RunDigest` and of `SIGNALS`
     run : whose signals they are
-    quantity : what they are
     zeros : degrees of freedom that vanish for every motion: named, not drawn
 
     Returns
@@ -113,12 +104,12 @@ def six_signals(kind: str, run: RunDigest, quantity: Quantity, zeros: Sequence[s
     figure, title, caption : no figure where nothing moves
 
     """
+    quantity = SIGNALS[signal]
     title = f'{quantity.label.capitalize()}, {run.controller}'
-    signal = DRAWN[kind]
     if signal not in run.columns:
         return None, title, f'{title}: without a set-point there is none.'
     drawn = plots.moving(run.part(signal), zeros)
-    structure = structure_sentence(kind, zeros)
+    structure = structure_sentence(signal, zeros)
     lacking = plots.unrecorded(run.part(signal), zeros)
     without = f'Not recorded, or resting on what was not: {join(lacking)}.' if lacking else ''
     if not drawn:
@@ -148,7 +139,7 @@ def structure_sentence(kind: str, zeros: Sequence[str]) -> str:
 
 
 def _errors(run: RunDigest) -> Drawn:
-    figure, title, caption = six_signals('errors', run, SIGNALS['error'])
+    figure, title, caption = six_signals('error', run)
     if run.sensing:
         caption += ' The law saw measured velocities; these errors are those of the true ones.'
     return figure, title, caption
@@ -159,11 +150,11 @@ def _lumped(run: RunDigest) -> Drawn:
         title = f'Lumped estimation error, {run.controller}'
         text = 'the law estimates nothing; w is −F, no error of an estimate, and not drawn.'
         return None, title, f'{title}: {text}'
-    return six_signals('lumped_error', run, SIGNALS['lumped_error'])
+    return six_signals('lumped_error', run)
 
 
 def _uncertainty(run: RunDigest) -> Drawn:
-    figure, title, caption = six_signals('uncertainty', run, SIGNALS['F'])
+    figure, title, caption = six_signals('F', run)
     kinds = [kind.replace('_', ' ') for kind in OF_THE_MOTION if kind in (run.kinds or ())]
     if kinds:
         caption += f' F contains {join(kinds)} and so depends on the motion of this very run.'
@@ -173,16 +164,15 @@ def _uncertainty(run: RunDigest) -> Drawn:
 def _inputs(run: RunDigest, limit: np.ndarray | None) -> Drawn:
     if run.acting and np.any(run.part('tau').peak):
         return applied_figure(run, limit)
-    return six_signals('inputs', run, SIGNALS['tau'])
+    return six_signals('tau', run)
 
 
 def _deformation(kind: str, run: RunDigest) -> Drawn:
     zeros = structural_zeros(control_model(run.vehicle).Upsilon.reshape(6, 6))[kind]
-    if kind == 'delta_xi':
-        return six_signals(kind, run, SIGNALS['delta_xi'], zeros)
-    drawn = six_signals(kind, run, SIGNALS['delta_pi'], zeros)
-    note = ' Of the commanded wrench.' if run.acting and drawn[0] is not None else ''
-    return drawn[0], drawn[1], drawn[2] + note
+    figure, title, caption = six_signals(kind, run, zeros)
+    if kind == 'delta_pi' and run.acting and figure is not None:
+        caption += ' Of the commanded wrench.'
+    return figure, title, caption
 
 
 def _peaks(part: Part, quantity: Quantity, drawn: Sequence[int]) -> str:

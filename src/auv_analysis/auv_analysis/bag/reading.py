@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import IO
 
 import numpy as np
 from mcap.records import Attachment, Channel, McapRecord, Metadata
@@ -172,14 +172,6 @@ class BagContents(FileExtent):
     lenient: bool = False
 
 
-class TopicBatch(NamedTuple):
-    """Messages of one topic: stamps (n,) in ns, values (n, 6) or (n, 13)."""
-
-    topic: str
-    stamps: np.ndarray
-    rows: np.ndarray
-
-
 class FileReader:
     """Reads one file of a bag into `contents`.
 
@@ -202,8 +194,8 @@ class FileReader:
         self._left_out: Counter[str] = Counter()
         self._reasons: dict[str, str] = {}  # topic -> why its first message was left out
 
-    def batches(self) -> Iterator[TopicBatch]:
-        """Messages of our topics, a table at a time; then note what was left out."""
+    def batches(self) -> Iterator[tuple[str, Series]]:
+        """Topics of ours with their messages, a table at a time; then note what was left out."""
         for item in self._file.records():
             if isinstance(item, MessageTable):
                 yield from self._table(item)
@@ -256,7 +248,7 @@ class FileReader:
             check_type(self._path, topic, kind)
             self._decoders.add(channel, schema)
 
-    def _table(self, table: MessageTable) -> Iterator[TopicBatch]:
+    def _table(self, table: MessageTable) -> Iterator[tuple[str, Series]]:
         members = {}
         for channel, index in self._file.by_channel(table):
             logged = table.log_times[index]
@@ -273,9 +265,10 @@ class FileReader:
             if len(entries) > 1:  # several channels of one topic
                 order = np.argsort(np.concatenate([index for index, _ in entries]))
                 parts = zip(*(series for _, series in entries), strict=True)
-                yield TopicBatch(topic, *(np.concatenate(part)[order] for part in parts))
+                stamps, rows = (np.concatenate(part)[order] for part in parts)
+                yield topic, (stamps, rows)
             else:
-                yield TopicBatch(topic, *entries[0][1])
+                yield topic, entries[0][1]
 
     def _found(
         self, table: MessageTable, members: dict[int, np.ndarray]
@@ -376,24 +369,6 @@ class FileReader:
                 self._decoders.value(topic, message, frames.get(namespace))
 
 
-def batches(bag: str | Path, contents: BagContents, *, decode: bool = True) -> Iterator[TopicBatch]:
-    """Messages of our topics in the order of the bag, a chunk at a time.
-
-    Parameters
-    ----------
-    bag : folder or .mcap file
-    contents : filled on the way, but for its messages
-    decode : whether our topics are read; else nothing comes, but everything is counted
-
-    Raises
-    ------
-    InputError : not a bag, or a message that must not be used
-
-    """
-    for path in bag_files(bag):
-        yield from FileReader(path, contents, decode).batches()
-
-
 def read_bag(
     bag: str | Path, namespace: str | None = None, *, decode: bool = True, whole: float = math.inf
 ) -> BagContents:
@@ -413,10 +388,11 @@ def read_bag(
     """
     contents = BagContents(namespace=namespace, asked=namespace is not None)
     columns: dict[str, tuple[SpooledColumn, SpooledColumn]] = {}
-    for topic, *series in batches(bag, contents, decode=decode):
-        pair = columns.setdefault(topic, (SpooledColumn(whole), SpooledColumn(whole)))
-        for column, rows in zip(pair, series, strict=True):
-            column.append(rows)
+    for path in bag_files(bag):
+        for topic, series in FileReader(path, contents, decode).batches():
+            pair = columns.setdefault(topic, (SpooledColumn(whole), SpooledColumn(whole)))
+            for column, rows in zip(pair, series, strict=True):
+                column.append(rows)
     for topic in [*columns]:  # one topic after the other, so that little is held twice
         stamps, values = columns.pop(topic)
         contents.messages[topic] = stamps.array(), values.array()

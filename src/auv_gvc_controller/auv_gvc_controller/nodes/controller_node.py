@@ -289,18 +289,12 @@ class ControllerNode(BulkMixin, LifecycleNode):
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Leave the vehicle without a wrench."""
-        self._leave()
+        self._let_go()
+        self._active = False
         return SUCCESS
 
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Leave the vehicle without a wrench."""
-        self._leave()
-        return SUCCESS
-
-    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Leave the vehicle without a wrench; success leads to unconfigured, and on from there."""
-        self._leave()
-        return SUCCESS
+    on_shutdown = on_deactivate
+    on_error = on_deactivate  # success leads to unconfigured, and on from there
 
     def _answer(self, callback: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
         """Answer of rclpy's services; it leaves a transition that does not exist without one."""
@@ -309,10 +303,6 @@ class ControllerNode(BulkMixin, LifecycleNode):
         except RCLError as error:
             self.get_logger().error(f'refused: {first_line(error)}')
             return response
-
-    def _leave(self) -> None:
-        self._let_go()
-        self._active = False
 
     def _build(self) -> bool:
         try:

@@ -1,7 +1,7 @@
 """A participant in a domain beside the program, and one that starts the plant and follows a run."""
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 import rclpy
@@ -95,7 +95,6 @@ class Watcher(Participant):
     Parameters
     ----------
     domain : ROS domain id
-    plant : name of the plant node
 
     Attributes
     ----------
@@ -104,8 +103,8 @@ class Watcher(Participant):
     """
 
     @undisturbed()
-    def __init__(self, domain: int, plant: str = 'plant_node'):
-        super().__init__(domain, _silent_node)
+    def __init__(self, domain: int):
+        super().__init__(domain, bare_node('auv'))
         self._node.create_subscription(
             PROGRESS.type, PROGRESS.name, self._on_progress, one_at_a_time()
         )
@@ -113,12 +112,12 @@ class Watcher(Participant):
             DIAGNOSTICS.type, DIAGNOSTICS.name, self._on_diagnostics, one_at_a_time()
         )
         self.alive: set[str] = set()
-        self._run = self._node.create_client(SetBool, f'{plant}/run')
+        self._run = self._node.create_client(SetBool, 'plant_node/run')
         self._asked: Future | None = None
         self._asked_at = 0.0
         self.complete_ns = -1
         self.running = False
-        self.waits_for = f'{plant} to appear'
+        self.waits_for = 'plant_node to appear'
 
     @undisturbed()
     def ask_to_run(self) -> bool:
@@ -135,14 +134,14 @@ class Watcher(Participant):
         return self.running
 
     @undisturbed()
-    def endpoints(self, names: Iterable[str] = (interface.WRENCH, interface.ODOM)) -> list[str]:
-        """Nodes that publish or subscribe topics of such names already, in any namespace.
+    def endpoints(self) -> list[str]:
+        """Nodes that publish or subscribe `wrench` or `odom` already, in any namespace.
 
         Observers are no strangers: they hold nothing up.
         """
         found: set[str] = set()
         for topic, _ in self._node.get_topic_names_and_types():
-            if topic.rpartition('/')[2] in names:
+            if topic.rpartition('/')[2] in (interface.WRENCH, interface.ODOM):
                 for look in (
                     self._node.get_publishers_info_by_topic,
                     self._node.get_subscriptions_info_by_topic,
@@ -156,7 +155,3 @@ class Watcher(Participant):
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         self.alive.update(status.name.lstrip('/') for status in message.status)
-
-
-def _silent_node(context: Context) -> Node:
-    return Node('auv', context=context, start_parameter_services=False, enable_rosout=False)

@@ -209,7 +209,8 @@ def _said(axes: Mapping[str, str], found: Mapping[str, Recorded]) -> str:
 
 
 def _track(role: str, one: Recorded, axes: str, rows: np.ndarray | None = None) -> Track:
-    rows = in_our_axes(one.rows, role, axes) if rows is None else rows
+    if rows is None:
+        rows = _SWAPS[role](one.rows) if axes == ENU_FLU else one.rows
     least = 1 if _is_held(one.source) else 2  # no line leads from a single message
     if len(one.stamps) < least:
         expected = f'at least {least} messages on the clock of the velocity'
@@ -233,9 +234,13 @@ def _velocity(one: Recorded, axes: str, pose: Track, frame: str) -> Track:
     """Velocity in FSD if its messages write it in the axes of that frame."""
     if frame == 'child':
         return _track('twist', one, axes)
-    earth = swap_earth(one.rows) if axes == ENU_FLU else one.rows
+    halves = [one.rows[:, :3], one.rows[:, 3:]]
+    if axes == ENU_FLU:
+        halves = [swap_position(half) for half in halves]
     inside = np.clip(one.stamps, pose.ns[0], pose.ns[-1])
-    return _track('twist', one, axes, from_earth(earth, at_times(pose, inside)[:, 3:]))
+    to_body = at_times(pose, inside)[:, 3:] * CONJUGATE
+    rows = np.concatenate([turn(to_body, half) for half in halves], axis=1)
+    return _track('twist', one, axes, rows)
 
 
 def with_rates(twist: Track, pose: Track, notes: list[str]) -> Track:
@@ -356,30 +361,3 @@ def axes_of(found: Recorded, notes: list[str]) -> str:
     if against:
         notes.append(f'{source.topic}: frame_id {against[0]} taken as {source.frames}, as told')
     return source.frames
-
-
-def in_our_axes(rows: np.ndarray, role: str, axes: str) -> np.ndarray:
-    """Rows of a role (n, k) in NED and FSD; those of thrusters have no axes."""
-    return _SWAPS[role](rows) if axes == ENU_FLU and role in _SWAPS else rows
-
-
-def from_earth(twist: np.ndarray, attitude: np.ndarray) -> np.ndarray:
-    """Velocity written in earth axes turned into body axes.
-
-    Parameters
-    ----------
-    twist : (n, 6) linear and angular velocity of the body, m/s and rad/s, in NED
-    attitude : (n, 4) quaternions w, x, y, z, FSD to NED
-
-    Returns
-    -------
-    nu : (n, 6) in FSD
-
-    """
-    halves = (twist[:, :3], twist[:, 3:])
-    return np.concatenate([turn(attitude * CONJUGATE, half) for half in halves], axis=1)
-
-
-def swap_earth(twist: np.ndarray) -> np.ndarray:
-    """Velocity (n, 6) in ENU axes to NED axes, or back."""
-    return np.concatenate([swap_position(twist[:, :3]), swap_position(twist[:, 3:])], axis=1)

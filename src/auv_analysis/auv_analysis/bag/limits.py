@@ -57,8 +57,8 @@ class Counts:
         """Number of records that the next chunk may hold."""
         return min(self._records, MOST_RECORDS)
 
-    def check(self, records: int, definitions: int) -> None:
-        """Raise TooManyError where a chunk holds too many records, or bytes of definitions."""
+    def take(self, records: int, definitions: int) -> None:
+        """Note what a chunk holds; TooManyError: too many records, or bytes of definitions."""
         if records > MOST_RECORDS:
             raise TooManyError(f'a chunk of at most {MOST_RECORDS} records', 'more')
         if records > self._records:
@@ -70,10 +70,6 @@ class Counts:
                 f'at most {self._most_definitions} bytes of definitions in a file of its size'
             )
             raise TooManyError(expected, 'more')
-
-    def take(self, records: int, definitions: int) -> None:
-        """The same, and note that the chunk holds them."""
-        self.check(records, definitions)
         self._records -= records
         self._definitions -= definitions
 

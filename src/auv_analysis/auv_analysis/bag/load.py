@@ -1,7 +1,7 @@
 """A recorded run: the steps that are complete on all topics, in memory or in mapped files."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -83,7 +83,7 @@ def open_bag(
 
     """
     bag, contents = Path(bag), read_bag(bag, namespace, whole=whole)
-    topics = topics_of_one_graph(contents.messages, contents, bag)
+    topics = topics_of_one_graph(contents, bag)
     series = {role: contents.messages.pop(topic) for role, topic in topics.items()}
     series, begun = longest_stretch(series, whole) if contents.lenient else (series, [])
     controller = attachments.parameters_of(contents, bag).get('controller_node', {})
@@ -171,13 +171,12 @@ def _slopes(rows: np.ndarray, step: float) -> Iterator[np.ndarray]:
         yield slope[here.start - first :][: here.stop - here.start]
 
 
-def topics_of_one_graph(topics: Iterable[str], contents: BagContents, bag: Path) -> dict[str, str]:
+def topics_of_one_graph(contents: BagContents, bag: Path) -> dict[str, str]:
     """Role -> topic, of the namespace that is read, or of the only one that is complete.
 
     Parameters
     ----------
-    topics : those of ours that have messages
-    contents : of the bag
+    contents : of the bag, with the messages of our topics
     bag : for the refusal
 
     Raises
@@ -185,7 +184,7 @@ def topics_of_one_graph(topics: Iterable[str], contents: BagContents, bag: Path)
     InputError : a topic without which there is no run has no messages, or there are several runs
 
     """
-    topics = set(topics)
+    topics = set(contents.messages)
     space = _namespace(topics, contents, bag)
     found = ', '.join(sorted(contents.types)) or 'no topics'
     frames = contents.frames[space]

@@ -179,7 +179,7 @@ def recorded_loop(bag: str | Path, vehicle: str | Path | None = None) -> Recorde
 
     """
     bag, contents = Path(bag), read_bag(bag)
-    topics = topics_of_one_graph(contents.messages, contents, bag)
+    topics = topics_of_one_graph(contents, bag)
     series = {role: contents.messages[topic] for role, topic in topics.items()}
     if interface.CMD_VEL not in series:
         raise NotOursError(bag, interface.CMD_VEL, 'messages', ', '.join(sorted(contents.types)))

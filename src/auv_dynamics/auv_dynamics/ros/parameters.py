@@ -14,21 +14,13 @@ from auv_dynamics.files.nearest import one_of as nearest_of
 from auv_dynamics.ros.settings import Settings, read_settings
 
 KNOWN_TO_ALL = {'use_sim_time', 'start_type_description_service'}
-TYPE_WORDS = {
-    RosParameter.Type.BOOL: 'true or false',
-    RosParameter.Type.INTEGER: 'a whole number',
-    RosParameter.Type.DOUBLE: 'a number',
-    RosParameter.Type.STRING: 'a word',
-    RosParameter.Type.DOUBLE_ARRAY: 'a list of numbers',
-    RosParameter.Type.STRING_ARRAY: 'a list of words',
-}
-TYPES = {
-    bool: RosParameter.Type.BOOL,
-    int: RosParameter.Type.INTEGER,
-    float: RosParameter.Type.DOUBLE,
-    str: RosParameter.Type.STRING,
-    list[float]: RosParameter.Type.DOUBLE_ARRAY,
-    list[str]: RosParameter.Type.STRING_ARRAY,
+TYPES = {  # and what is expected of their values
+    bool: (RosParameter.Type.BOOL, 'true or false'),
+    int: (RosParameter.Type.INTEGER, 'a whole number'),
+    float: (RosParameter.Type.DOUBLE, 'a number'),
+    str: (RosParameter.Type.STRING, 'a word'),
+    list[float]: (RosParameter.Type.DOUBLE_ARRAY, 'a list of numbers'),
+    list[str]: (RosParameter.Type.STRING_ARRAY, 'a list of words'),
 }
 
 
@@ -75,11 +67,12 @@ def declare(
         descriptor.additional_constraints = f'one of {", ".join(one_of)}'
     if at_least is not None or at_most is not None:
         _set_range(descriptor, kind, at_least, at_most)
+    ros_type, expected = TYPES[kind]
     if value is None and default is None:
-        node.declare_parameter(name, TYPES[kind], descriptor, ignore_override=True)
+        node.declare_parameter(name, ros_type, descriptor, ignore_override=True)
         return None
-    if value is None or RosParameter.Type.from_parameter_value(value) != TYPES[kind]:
-        raise InputError(node.get_name(), name, TYPE_WORDS[TYPES[kind]], value)
+    if value is None or RosParameter.Type.from_parameter_value(value) != ros_type:
+        raise InputError(node.get_name(), name, expected, value)
     try:
         node.declare_parameter(name, value, descriptor, ignore_override=True)
     except InvalidParameterValueException:

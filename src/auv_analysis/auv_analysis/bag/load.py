@@ -87,14 +87,20 @@ def open_bag(
     series = {role: contents.messages.pop(topic) for role, topic in topics.items()}
     series, begun = longest_stretch(series, whole) if contents.lenient else (series, [])
     controller = attachments.parameters_of(contents, bag).get('controller_node', {})
-    held = holds(contents, controller)
+    # where the bag does not say it: a controller beside a driver held its set-points
+    held = controller.get('setpoint_pairing', LATEST if contents.lenient else None) == LATEST
     if held:
         series = held_series(series, whole)
     counts = {role: len(stamps) for role, (stamps, _) in series.items()}
     ns, values = complete(series, whole)
-    step_by_step = {r: count for r, count in counts.items() if not (held and r in SETPOINTS)}
-    notes = [*begun, *dropped(step_by_step, len(ns), bag)]
-    facts = _facts(contents, bag, vehicle, ns, notes)
+    if len(ns) < 2:
+        raise NotOursError(bag, '', 'at least two steps that are complete on all step topics', '0')
+    dropped = [
+        f'{role}: {count - len(ns)} of {count} messages are not complete on all topics'
+        for role, count in counts.items()
+        if count > len(ns) and not (held and role in SETPOINTS)
+    ]
+    facts = _facts(contents, bag, vehicle, ns, [*begun, *dropped])
     return Recording(_run(ns, values, facts, whole), contents.attachments)
 
 
@@ -300,43 +306,6 @@ def _picked(rows: np.ndarray, index: np.ndarray, whole: float) -> np.ndarray:
     if not len(index):
         return rows[:0]
     return gathered((rows_of(rows, index[here]) for here in slices(len(index))), whole)
-
-
-def dropped(counts: dict[str, int], steps: int, bag: Path) -> list[str]:
-    """Notes on messages that are not complete on all topics.
-
-    Parameters
-    ----------
-    counts : role -> number of messages
-    steps : that are complete
-    bag : for the refusal
-
-    Raises
-    ------
-    InputError : there is no run in fewer than two steps
-
-    """
-    if steps < 2:
-        raise NotOursError(bag, '', 'at least two steps that are complete on all step topics', '0')
-    return [
-        f'{role}: {count - steps} of {count} messages are not complete on all topics'
-        for role, count in counts.items()
-        if count > steps
-    ]
-
-
-def holds(contents: BagContents, controller: Mapping[str, object]) -> bool:
-    """Whether the recorded controller held its set-points.
-
-    Parameters
-    ----------
-    contents : of the bag
-    controller : parameters of the controller node; empty: not recorded
-
-    """
-    if 'setpoint_pairing' in controller:
-        return controller['setpoint_pairing'] == LATEST
-    return contents.lenient
 
 
 def held_series(series: Mapping[str, Series], whole: float = math.inf) -> dict[str, Series]:

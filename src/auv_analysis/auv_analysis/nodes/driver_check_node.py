@@ -109,56 +109,6 @@ def _arrived(info: dict[str, Any]) -> int:
     return info.get('received_timestamp') or time.time_ns()
 
 
-def graph_snapshot(node: Any, odom: str, wrench: str, place: str) -> GraphSnapshot:
-    """Endpoints beside a node.
-
-    Parameters
-    ----------
-    node : that looks; it is no part of the snapshot
-    odom, wrench : full names of the topics
-    place : domain and namespace, in words
-
-    """
-    odometry = node.get_publishers_info_by_topic(odom)
-    takers = list(filter(acts, other_subscribers(node, wrench)))
-    clocks = node.get_publishers_info_by_topic(topics.CLOCK.name)
-    names = [name for name, _ in node.get_topic_names_and_types()]
-    rest = [name for name in names if name not in (odom, wrench)]
-    return GraphSnapshot(
-        place,
-        odom,
-        wrench,
-        ODOMETRY,
-        WRENCH,
-        odom_publishers=tuple(map(_endpoint, odometry)),
-        wrench_publishers=tuple(map(_endpoint, other_publishers(node, wrench))),
-        wrench_subscribers=tuple(map(_endpoint, takers)),
-        clock_publishers=tuple(map(_endpoint, clocks)),
-        conflicts={
-            'controller': _conflict(
-                (one, _spelled(topics.newest_measurement())) for one in _of(odometry)
-            ),
-            'recorder': _conflict((one, _spelled(topics.every_step())) for one in _of(odometry)),
-            'wrench': _conflict(
-                (_spelled(topics.every_step()), one) for one in _of(takers, WRENCH)
-            ),
-        },
-        elsewhere=_nodes(
-            (name, one)
-            for name in rest
-            for one in node.get_publishers_info_by_topic(name)
-            if one.topic_type == ODOMETRY
-        ),
-        listeners=_nodes(
-            (name, one)
-            for name in rest
-            for one in other_subscribers(node, name)
-            if one.topic_type == WRENCH and acts(one)
-        ),
-        topics=tuple(names),
-    )
-
-
 def _endpoint(info: Any) -> Endpoint:
     qos = info.qos_profile
     policies = qos.reliability.name.lower(), qos.durability.name.lower()
@@ -236,8 +186,48 @@ class RosDriverClient(Participant):
         return self._node.count_publishers(self._node.odom) > 0
 
     def graph(self, place: str) -> GraphSnapshot:
-        """Who is there."""
-        return graph_snapshot(self._node, self._node.odom, self._node.wrench, place)
+        """Who is there but itself; `place`: domain and namespace, in words."""
+        node, odom, wrench = self._node, self._node.odom, self._node.wrench
+        odometry = node.get_publishers_info_by_topic(odom)
+        takers = list(filter(acts, other_subscribers(node, wrench)))
+        clocks = node.get_publishers_info_by_topic(topics.CLOCK.name)
+        names = [name for name, _ in node.get_topic_names_and_types()]
+        rest = [name for name in names if name not in (odom, wrench)]
+        return GraphSnapshot(
+            place,
+            odom,
+            wrench,
+            ODOMETRY,
+            WRENCH,
+            odom_publishers=tuple(map(_endpoint, odometry)),
+            wrench_publishers=tuple(map(_endpoint, other_publishers(node, wrench))),
+            wrench_subscribers=tuple(map(_endpoint, takers)),
+            clock_publishers=tuple(map(_endpoint, clocks)),
+            conflicts={
+                'controller': _conflict(
+                    (one, _spelled(topics.newest_measurement())) for one in _of(odometry)
+                ),
+                'recorder': _conflict(
+                    (one, _spelled(topics.every_step())) for one in _of(odometry)
+                ),
+                'wrench': _conflict(
+                    (_spelled(topics.every_step()), one) for one in _of(takers, WRENCH)
+                ),
+            },
+            elsewhere=_nodes(
+                (name, one)
+                for name in rest
+                for one in node.get_publishers_info_by_topic(name)
+                if one.topic_type == ODOMETRY
+            ),
+            listeners=_nodes(
+                (name, one)
+                for name in rest
+                for one in other_subscribers(node, name)
+                if one.topic_type == WRENCH and acts(one)
+            ),
+            topics=tuple(names),
+        )
 
     def log(self, began_ns: int) -> OdometryLog:
         """What was heard since a time, up to now."""

@@ -144,11 +144,6 @@ class BagWriter:
         return self._health.trouble
 
     @property
-    def broken(self) -> bool:
-        """Whether the bag cannot even be finished."""
-        return self._health.broken
-
-    @property
     def path(self) -> Path:
         """File that is being written."""
         return self._file.output.path
@@ -231,7 +226,7 @@ class BagWriter:
 
     def _look(self) -> None:
         """What the thread does every tenth of a second; whatever it raises ends the recording."""
-        if self.broken:
+        if self._health.broken:
             return
         with self._lock:
             try:
@@ -244,7 +239,7 @@ class BagWriter:
         if now - self._checked >= CHECK_PERIOD:
             self._checked = now
             self._health.check(file)
-        if now - self._synced >= SYNC_PERIOD and not self.broken:
+        if now - self._synced >= SYNC_PERIOD and not self._health.broken:
             try:
                 file.output.sync()
             except Exception as error:
@@ -252,7 +247,7 @@ class BagWriter:
             self._synced = time.monotonic()
 
     def _finish_full(self) -> None:
-        while self._full and not self.broken:
+        while self._full and not self._health.broken:
             file = self._full[0]
             try:
                 file.finish()
@@ -278,7 +273,7 @@ class BagWriter:
             self._health.give_up(f'{self.path}: the disk does not answer')
             self._health.refuse_broken()
         self._full.append(self._file)
-        if not self.broken:
+        if not self._health.broken:
             self._health.check(self._file)
         self._finish_full()
         for file in self._full:

@@ -1,6 +1,10 @@
-"""Runs whose blocks have another length than is asked for."""
+"""Runs whose blocks have another length than is asked for, and blocks as a run again."""
 
 import copy
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from auv_analysis.runs.run import Run
 
@@ -11,3 +15,9 @@ def in_blocks(run: Run, rows: int) -> Run:
     object.__setattr__(same, 'blocks', lambda _=0: run.blocks(rows))
     object.__setattr__(same, 'wide_blocks', lambda margin, _=0: run.wide_blocks(margin, rows))
     return same
+
+
+def joined(parts: Sequence[Run]) -> Run:
+    """One run of consecutive parts."""
+    arrays = [part.arrays() for part in parts]
+    return replace(parts[0], **{n: np.concatenate([a[n] for a in arrays]) for n in arrays[0]})

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.block_runs import joined
 from helpers.made_messages import FRAMES, ODOMETRY, Bag, odometry, serialized, stamped
 from helpers.strategies import examples
 from hypothesis import given
@@ -20,7 +21,7 @@ from auv_analysis.bag.metadata import RECORDING, recording_text
 from auv_analysis.bag.reading import read_bag
 from auv_analysis.cli.main import main
 from auv_analysis.nodes.recorder_node import StepLedger
-from auv_analysis.runs.run import Run, joined
+from auv_analysis.runs.run import Run
 from auv_analysis.studies.compare.sources import open_source, sources_of
 from auv_dynamics.files.errors import InputError
 

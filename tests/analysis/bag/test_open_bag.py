@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.block_runs import joined
 from helpers.made_messages import ODOMETRY, Bag, odometry, serialized, stamped
 from helpers.strategies import examples
 from hypothesis import given
@@ -20,7 +21,7 @@ from auv_analysis.bag import load
 from auv_analysis.bag.load import load_run, open_bag
 from auv_analysis.bag.reading import slices
 from auv_analysis.report.digest import digest
-from auv_analysis.runs.run import Run, joined
+from auv_analysis.runs.run import Run
 from auv_dynamics.files.errors import FailedError, InputError
 
 STEP = 10_000_000

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.block_runs import in_blocks
+from helpers.block_runs import in_blocks, joined
 from helpers.certificates import certificate_of
 from helpers.strategies import examples
 from hypothesis import given
@@ -22,7 +22,7 @@ from auv_analysis.metrics import signals as of
 from auv_analysis.metrics.certificate import certificate_blocks
 from auv_analysis.metrics.compiled_moments import add_compiled
 from auv_analysis.metrics.moments import Moments
-from auv_analysis.runs.run import Run, joined
+from auv_analysis.runs.run import Run
 from auv_gvc_controller.laws.model import control_model
 
 quick = examples(10)

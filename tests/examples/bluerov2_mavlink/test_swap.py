@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from helpers.block_runs import joined
 from helpers.mavlink_relay import EXAMPLE, fork_program, free_port
 from helpers.node_processes import PATIENCE, Peer, auv, fresh_domain, parameters, start_node, stop
 from numpy.testing import assert_array_equal
@@ -15,7 +16,6 @@ from std_srvs.srv import SetBool
 
 from auv_analysis.bag.load import load_run, open_bag
 from auv_analysis.cli.main import main
-from auv_analysis.runs.run import joined
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.interface import NANOSECONDS, Frames
 from auv_dynamics.ros.topics import Topic

@@ -2,7 +2,7 @@
 
 import mmap
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
@@ -281,16 +281,6 @@ def rows_of(values: np.ndarray, keep: Any) -> np.ndarray:
     rows = np.array(values[keep])
     base.madvise(mmap.MADV_DONTNEED)
     return rows
-
-
-def joined(parts: Sequence[Run]) -> Run:
-    """One run of consecutive parts."""
-    first = parts[0]
-    if len(parts) == 1:
-        return first
-    arrays = [part.arrays() for part in parts]
-    whole: dict[str, Any] = {n: np.concatenate([a[n] for a in arrays]) for n in arrays[0]}
-    return replace(first, **whole)
 
 
 class Windows:

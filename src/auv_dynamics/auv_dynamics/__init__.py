@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
 _HOME = {
-    'InputError': 'auv_dynamics.files.yaml_files',
+    'InputError': 'auv_dynamics.files.errors',
     'Vehicle': 'auv_dynamics.vehicle.vehicle',
     'load_vehicle': 'auv_dynamics.vehicle.vehicle_file',
 }

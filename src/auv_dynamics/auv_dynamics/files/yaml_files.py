@@ -14,12 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 
-from auv_dynamics.files.errors import (
-    InputError,
-    first_line,
-    reason,
-    shorten,
-)
+from auv_dynamics.files.errors import InputError, first_line, reason, shorten
 from auv_dynamics.files.nearest import meant, one_of
 
 if TYPE_CHECKING:
@@ -172,11 +167,6 @@ def _is_small(data: Any, levels: float = math.inf) -> bool:
     return True
 
 
-__all__ = [
-    'InputError', 'check', 'dotted', 'first_line', 'matrix6', 'parse_any_yaml', 'parse_yaml',
-    'read_text', 'read_yaml', 'reason', 'schema', 'shorten',
-    'validate', 'yaml_text',
-]  # fmt: skip
 LARGEST = 1e100  # products of a few such numbers are still finite
 LARGEST_FILE = 1 << 28  # bytes of a text file
 PIECE = 1 << 22  # bytes that are read at once

@@ -12,6 +12,7 @@ from auv_dynamics.plant.devices import LOST, SensorNoise
 from auv_dynamics.plant.faults import (
     AGE,
     AXES,
+    END,
     HELD,
     THRUSTERS,
     WRENCH,
@@ -53,7 +54,7 @@ def test_without_times_it_is_always_there():
 def test_times_beyond_all_steps_are_never_reached():
     setting = FaultSetting(1e-9, None, None, False, 'x', 'f')
     late = {'kind': 'wrench_loss', 'from': 0.0, 'to': 1e300}
-    assert make_faults([late], ['a'], setting).entries[0].stays
+    assert make_faults([late], ['a'], setting).entries[0].end == END
     with pytest.raises(InputError, match='a step between from'):
         make_faults([{'kind': 'wrench_loss', 'from': 1e299, 'to': 1e300}], ['a'], setting)
     with pytest.raises(InputError, match='at most 1000000 steps'):

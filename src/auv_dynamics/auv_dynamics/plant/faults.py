@@ -19,7 +19,6 @@ from auv_dynamics.vehicle.thrusters import Thrusters
 
 SENSING = ('sensor_drop_out', 'sensor_delay', 'sensor_bias')
 ACTING = ('thruster', 'actuator', 'wrench_loss')
-KINDS = (*SENSING, *ACTING)
 RANDOM = ('sensor_drop_out', 'wrench_loss')  # of a probability
 WRENCH, AGE, AXES, THRUSTERS = 0, 1, 2, 14  # where these stand in a row
 HELD, ZEROED = 1.0, 2.0  # a lost wrench: the last one is kept; it has been kept for too long
@@ -59,17 +58,12 @@ class Fault:
 
     @property
     def kind(self) -> str:
-        """One of `KINDS`."""
+        """One of `SENSING` or `ACTING`."""
         return self.spec['kind']
 
     def there(self, k: np.ndarray) -> np.ndarray:
         """(n,) whether it is there at steps k (n,)."""
         return (k >= self.first) & (k < self.end)
-
-    @property
-    def stays(self) -> bool:
-        """Whether it lasts to the end of the run."""
-        return self.end == END
 
 
 @dataclass(frozen=True)

@@ -144,6 +144,7 @@ def test_a_line_that_was_cut_off_is_left_out(tmp_path) -> None:
     ('t,u,v\n0,1,2\n1,3\n2,3,4\n', r'x.csv: line 3: expected 3 cells, one per column, found 2'),
     ('t,u,v\n0,1,2\n# pause\n1,x y,4\n', r'line 4, column u: expected a number, or nothing, found'),
     ('t,u,v\n0,on,2\n1,3,4\n', r'line 2, column u: expected a number, or nothing, found on'),
+    ('t,u,v\n0,-nan,2\n1,on,4\n', r'line 3, column u: expected a number, or nothing, found on'),
     ('t,u,v\n0,"1,2\n1,3,4\n', r'line 3: expected 3 cells'),
     ('t,u,w\n0,1,2\n', r'twist.fields.v: expected a path in its messages: t, u, w.*, found v$'),
     ('t,u,v\n', r'x: expected messages, found none'),

@@ -271,14 +271,15 @@ class Table:
 
     def is_cell(self, cell: str) -> bool:
         """Whether a cell has a number or nothing."""
-        return _is_nothing(cell) or self.is_number(cell)
+        try:
+            self.number(cell)
+        except ValueError:
+            return False
+        return True
 
     def is_number(self, cell: str) -> bool:
         """Whether a cell has a number."""
-        try:
-            return not math.isnan(self.number(cell))
-        except ValueError:
-            return False
+        return self.is_cell(cell) and not math.isnan(self.number(cell))
 
 
 class Block:

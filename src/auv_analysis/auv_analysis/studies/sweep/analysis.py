@@ -301,7 +301,7 @@ class Analysis:
         return self._ranks[key]
 
     def counts(self) -> list[Row]:
-        """Rows of each controller by status, and the commonest reasons."""
+        """Rows of each controller by status."""
         return [self._count(i, name) for i, name in enumerate(self.sweep.controllers)]
 
     def _count(self, place: int, name: str) -> Row:

@@ -20,7 +20,7 @@ from auv_analysis.output.progress import console, say, share_bar, waiting
 from auv_analysis.output.text import MISSING, join, largest, number, plain, residuals
 from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.verdict import FAILED, verdict
-from auv_analysis.runs.run import AnyRun, Hold
+from auv_analysis.runs.run import Hold, Run
 from auv_analysis.runs.samples import ENDING, write_samples
 from auv_analysis.scenario.scenario import Scenario, check_names, load_scenario, write_inputs
 from auv_analysis.simulation.simulate import announce, simulate
@@ -32,7 +32,7 @@ BAR = 24  # columns
 WIDTH = 9  # columns of a number
 ZERO = 'zero'
 Column = tuple[str, Sequence[str]]
-Examine = Callable[[Mapping[str, AnyRun], Mapping[str, Mapping[str, Any]]], dict[str, Any]]
+Examine = Callable[[Mapping[str, Run], Mapping[str, Mapping[str, Any]]], dict[str, Any]]
 
 
 def open_scenario(options: argparse.Namespace) -> tuple[Scenario, list[str]]:
@@ -90,11 +90,11 @@ def say_margins(
 
 def simulated(
     scenario: Scenario, names: list[str], out: Path, hold: Hold
-) -> tuple[dict[str, AnyRun], Exception | None]:
+) -> tuple[dict[str, Run], Exception | None]:
     """Simulate controllers into a folder; runs by name, and the first failure."""
     write_inputs(scenario, out)
     announce(scenario, names)
-    runs: dict[str, AnyRun] = {}
+    runs: dict[str, Run] = {}
     failure = None
     for name in names:
         try:
@@ -244,7 +244,7 @@ def _coupled(values: Sequence[float | None] | None, zeros: Sequence[str]) -> lis
 
 def finish(
     out: Path,
-    runs: Mapping[str, AnyRun],
+    runs: Mapping[str, Run],
     failure: Exception | None,
     scenario: Scenario,
     **chosen: Any,
@@ -265,7 +265,7 @@ def finish(
 
 def conclude(
     out: Path,
-    runs: Mapping[str, AnyRun],
+    runs: Mapping[str, Run],
     scenario_text: str | dict[str, str],
     vehicle_text: str | dict[str, str],
     *,
@@ -308,7 +308,7 @@ def conclude(
 
 def _report(
     out: Path,
-    runs: Mapping[str, AnyRun],
+    runs: Mapping[str, Run],
     shown: Mapping[str, RunDigest],
     summaries: dict[str, Any],
     texts: tuple[Any, Any],

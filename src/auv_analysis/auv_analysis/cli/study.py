@@ -21,7 +21,7 @@ from auv_analysis.cli.arguments import (
 from auv_dynamics.files.errors import InputError
 
 if TYPE_CHECKING:
-    from auv_analysis.runs.run import AnyRun
+    from auv_analysis.runs.run import Run
     from auv_analysis.scenario.scenario import Scenario
     from auv_analysis.studies.study.sensitivity import Sensitivity
 
@@ -112,7 +112,7 @@ def _examine(
     options: argparse.Namespace,
     scenario: Scenario,
     out: Path,
-    runs: Mapping[str, AnyRun],
+    runs: Mapping[str, Run],
     summaries: Mapping[str, Mapping[str, Any]],
 ) -> dict[str, Any]:
     """What the report has beside the runs, and the Parquet files that it rests on."""

@@ -17,7 +17,7 @@ from auv_analysis.graph.fork_server import ForkServer
 from auv_analysis.graph.supervisor import Begin, NodeDiedError, TroubleError
 from auv_analysis.output.folder import ResultsFolder
 from auv_analysis.output.progress import Speed, bar, count, say, waiting
-from auv_analysis.runs.run import AnyRun
+from auv_analysis.runs.run import Run
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.simulate import warm_up
 from auv_dynamics.files.errors import FailedError, InputError
@@ -67,7 +67,7 @@ def recorded(
     graph: FreeGraph,
     *,
     composed: bool = False,
-) -> tuple[dict[str, AnyRun], FailedError | None]:
+) -> tuple[dict[str, Run], FailedError | None]:
     """Run controllers on the node graph, one after the other.
 
     Parameters

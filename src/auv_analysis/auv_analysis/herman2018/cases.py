@@ -10,7 +10,7 @@ from auv_analysis.herman2018.evidence import BOTH, Claim, ErrorSensitivity, Evid
 from auv_analysis.herman2018.responses import response
 from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.document import Sentence
-from auv_analysis.runs.run import AnyRun, Hold
+from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scenario import Scenario, load_scenario
 from auv_analysis.simulation.simulate import simulate
@@ -40,7 +40,7 @@ class PaperClaims:
 
 def paper_claims(
     scenario: Scenario,
-    runs: Mapping[str, AnyRun | RunDigest],
+    runs: Mapping[str, Run | RunDigest],
     sensitivities: Mapping[str, Sensitivity] | None = None,
     *,
     hold: Hold = 'continuous',
@@ -89,7 +89,7 @@ def case_of(scenario: Scenario, case: str) -> Scenario:
 
 def case_evidence(
     case: Scenario,
-    at_hand: Mapping[str, AnyRun | RunDigest] | None = None,
+    at_hand: Mapping[str, Run | RunDigest] | None = None,
     hold: Hold = 'continuous',
 ) -> Evidence:
     """Evidence of one of the paper's cases, from runs at hand where they have its gains."""
@@ -120,7 +120,7 @@ def _differences(path: str, ours: Any, theirs: Any) -> Iterator[tuple[str, Any, 
 
 def _responses(
     scenario: Scenario,
-    runs: Mapping[str, AnyRun | RunDigest],
+    runs: Mapping[str, Run | RunDigest],
     sensitivities: Mapping[str, Sensitivity],
     hold: Hold,
     threads: int,

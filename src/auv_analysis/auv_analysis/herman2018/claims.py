@@ -24,7 +24,7 @@ from auv_analysis.output.text import MISSING, fixed, join
 from auv_analysis.report.digest import TINY, RunDigest, digests
 from auv_analysis.report.document import Block, Section, Sentence, prose
 from auv_analysis.report.results import Column, Shown, described, make_table
-from auv_analysis.runs.run import AnyRun, RunInfo
+from auv_analysis.runs.run import Run, RunInfo
 from auv_analysis.scenario.scenario import Scenario, load_scenario
 from auv_dynamics.plant.disturbance import make_disturbance
 
@@ -218,7 +218,7 @@ GAINS = {
 
 
 def judge_runs(
-    runs: Mapping[str, AnyRun | RunDigest], summaries: Mapping[str, Mapping[str, Any]]
+    runs: Mapping[str, Run | RunDigest], summaries: Mapping[str, Mapping[str, Any]]
 ) -> list[Claim]:
     """The paper's claims, each with what these runs say of it.
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_analysis.runs.run import BLOCK, AnyRun, Run
+from auv_analysis.runs.run import BLOCK, Run
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import ControlModel
 
@@ -252,9 +252,7 @@ def integral_of(run: Run, start: np.ndarray | None = None) -> np.ndarray | None:
     return sampled_integral(run.t, run.nu_d - run.nu_measured, start)
 
 
-def certificate_blocks(
-    run: AnyRun, model: ControlModel, rows: int = BLOCK
-) -> Iterator[Certificate]:
+def certificate_blocks(run: Run, model: ControlModel, rows: int = BLOCK) -> Iterator[Certificate]:
     """Certificate of each block of a run of one of the `LAWS` with known gains.
 
     Parameters

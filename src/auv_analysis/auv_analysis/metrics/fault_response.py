@@ -11,7 +11,7 @@ import numpy as np
 from auv_analysis.metrics.statistics import Part, Statistics
 from auv_analysis.metrics.summary import TRANSIENT, band_of, has_settled
 from auv_analysis.output.new_files import write_table
-from auv_analysis.runs.run import AnyRun, RunInfo
+from auv_analysis.runs.run import Run, RunInfo
 from auv_analysis.scenario.fault_words import Mark
 from auv_dynamics.vehicle import DOFS
 
@@ -77,7 +77,7 @@ def next_change(mark: Mark, run: RunInfo) -> float:
     return min([last, *begins, *(other.end for other in run.faults if other.end > mark.end)])
 
 
-def responses(run: AnyRun) -> list[FaultResponse]:
+def responses(run: Run) -> list[FaultResponse]:
     """Every fault of a run in every degree of freedom; none where no set-point is known."""
     if not run.faults or not run.knows_setpoint:
         return []

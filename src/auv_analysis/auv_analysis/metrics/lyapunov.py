@@ -15,7 +15,7 @@ from auv_analysis.metrics.certificate import (
     certificate_blocks,
     form_of,
 )
-from auv_analysis.runs.run import AnyRun
+from auv_analysis.runs.run import Run
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import ControlModel
 
@@ -62,7 +62,7 @@ def _no_decrease(law: str, form: Form) -> str:
     return ''
 
 
-def lyapunov(run: AnyRun, model: ControlModel) -> dict[str, Any]:
+def lyapunov(run: Run, model: ControlModel) -> dict[str, Any]:
     """Figures of the certificate of a run, ready for JSON.
 
     Parameters

@@ -18,7 +18,7 @@ from auv_analysis.metrics.energy import depends_on_known, shares
 from auv_analysis.metrics.lyapunov import lyapunov
 from auv_analysis.metrics.moments import Moments, Tally
 from auv_analysis.output.new_files import known
-from auv_analysis.runs.run import AnyRun, Run, RunInfo
+from auv_analysis.runs.run import Run, RunInfo
 from auv_gvc_controller.control.gains import body_gains
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model
@@ -35,7 +35,7 @@ SETTLED = f'{BAND_TEXT}, and dwells there for the last {DWELL} % of the run or l
 
 
 def summarize(
-    run: AnyRun, window: Window | None = None, windows: Sequence[Window] = ()
+    run: Run, window: Window | None = None, windows: Sequence[Window] = ()
 ) -> dict[str, Any]:
     """Figures of a run as a plain dict, ready for JSON.
 
@@ -190,19 +190,19 @@ def _settling(
     return times, residual.tolist()
 
 
-def _usual_windows(run: AnyRun) -> list[Window]:
+def _usual_windows(run: Run) -> list[Window]:
     end = run.start + run.duration
     starts = (run.start, run.start + min(ENERGY_WINDOW, run.duration)), (run.start, end)
     return [*starts, (run.start + TRANSIENT, end)] if run.duration > TRANSIENT else [*starts]
 
 
-def _cuts(run: AnyRun, window: Window) -> Window:
+def _cuts(run: Run, window: Window) -> Window:
     """Cuts before the first and behind the last sample of a window."""
     first, last = window
     return first - run.step / 2, float(np.nextafter(last + run.step / 2, np.inf))
 
 
-def _errors(run: AnyRun, whole: Moments, after: Moments, known: np.ndarray) -> dict[str, Any]:
+def _errors(run: Run, whole: Moments, after: Moments, known: np.ndarray) -> dict[str, Any]:
     if not run.knows_setpoint:
         none = dict.fromkeys(('rms', 'max_after_2s', 'settling_time'))
         return {'velocity_error': none, 'settling': None}

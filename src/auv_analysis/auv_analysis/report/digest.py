@@ -12,7 +12,7 @@ from auv_analysis.metrics.energy import kinetic_energy, shares
 from auv_analysis.metrics.statistics import Part, Statistics
 from auv_analysis.metrics.summary import ENERGY_WINDOW, TRANSIENT, has_settled
 from auv_analysis.report.traces import Line, Trace, broken
-from auv_analysis.runs.run import AnyRun, Extent, Run, RunInfo
+from auv_analysis.runs.run import Extent, Run, RunInfo
 from auv_gvc_controller.laws.model import ControlModel, control_model
 
 FOREVER = float('inf')
@@ -156,7 +156,7 @@ SHARE_COLUMNS = 600  # px across, of the stacked shares
 COURSE = 1000  # samples, at most, by which runs are compared
 
 
-def digests(runs: Mapping[str, AnyRun | RunDigest]) -> dict[str, RunDigest]:
+def digests(runs: Mapping[str, Run | RunDigest]) -> dict[str, RunDigest]:
     """Digest of each of the runs that are shown together; what is one already stays as it is."""
     window = common_window(runs)
     return {
@@ -169,7 +169,7 @@ def common_window(runs: Mapping[str, RunInfo]) -> float:
     return min([ENERGY_WINDOW, *(run.duration for run in runs.values())])
 
 
-def digest(run: AnyRun, window: float = ENERGY_WINDOW) -> RunDigest:
+def digest(run: Run, window: float = ENERGY_WINDOW) -> RunDigest:
     """Digest of a run.
 
     Parameters
@@ -215,7 +215,7 @@ def signals(run: Run, model: ControlModel) -> dict[str, np.ndarray]:
     return found
 
 
-def is_split(run: AnyRun | RunDigest) -> bool:
+def is_split(run: Run | RunDigest) -> bool:
     """Whether the first phase of a run is drawn apart."""
     return run.duration > 2.0 * TRANSIENT
 
@@ -223,7 +223,7 @@ def is_split(run: AnyRun | RunDigest) -> bool:
 class _Builder:
     """Takes the blocks of a run in their order."""
 
-    def __init__(self, run: AnyRun, window: float):
+    def __init__(self, run: Run, window: float):
         self._run, self._model, self._split = run, control_model(run.vehicle), is_split(run)
         start, end = run.start, run.start + run.duration
         self._ends = {

@@ -28,7 +28,7 @@ from auv_analysis.report.document import Block, Section, Sentence
 from auv_analysis.report.plots import DASHES, GREY, RUNS, Drawn, save_figures
 from auv_analysis.report.results import Shown, Table, described, view_of_file
 from auv_analysis.report.run_plots import common_bands, left_out
-from auv_analysis.runs.run import AnyRun
+from auv_analysis.runs.run import Run
 from auv_dynamics.vehicle import DOFS
 
 ABOUT = (
@@ -39,7 +39,7 @@ TITLE = 'Faults: what each law does under them'
 NO_ERROR = 'No set-point of these runs is known, and so no error.'
 
 
-def fault_part(out: Path, runs: Mapping[str, AnyRun]) -> tuple[Section, list[Sentence]] | None:
+def fault_part(out: Path, runs: Mapping[str, Run]) -> tuple[Section, list[Sentence]] | None:
     """Section on the faults of some runs; writes `faults.parquet` and the figure.
 
     Parameters

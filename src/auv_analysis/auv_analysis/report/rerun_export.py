@@ -9,7 +9,7 @@ import numpy as np
 from auv_analysis.metrics.energy import kinetic_energy, shares
 from auv_analysis.output.new_files import created, unfinished_name
 from auv_analysis.report.plots import COLOURS, GREY
-from auv_analysis.runs.run import AnyRun, Run
+from auv_analysis.runs.run import Run
 from auv_dynamics.files.errors import InputError, reason
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.kinematics import quaternion
@@ -35,7 +35,7 @@ def library() -> Any:
     return rerun
 
 
-def export(run: AnyRun, path: Path) -> int:
+def export(run: Run, path: Path) -> int:
     """Write a run; files of several controllers of a scenario open as one.
 
     Parameters
@@ -73,7 +73,7 @@ def export(run: AnyRun, path: Path) -> int:
     return samples
 
 
-def signals(run: AnyRun, block: Run) -> Iterator[tuple[str, str, np.ndarray]]:
+def signals(run: Run, block: Run) -> Iterator[tuple[str, str, np.ndarray]]:
     """Quantity, whose it is and its values (n, 6), body frame: m/s, rad/s; N, N m; %."""
     model = control_model(run.vehicle)
     yield VELOCITY, run.controller, block.nu
@@ -94,7 +94,7 @@ def _numbers(colour: str) -> list[int]:
     return list(bytes.fromhex(colour[1:]))
 
 
-def _name(recording: 'rerun.RecordingStream', run: AnyRun) -> None:
+def _name(recording: 'rerun.RecordingStream', run: Run) -> None:
     """What does not change with time: axes, colours, names and widths of lines."""
     rr = library()
     recording.log(TRAJECTORY, rr.ViewCoordinates.FRD, static=True)  # as NED: x north, z down
@@ -112,7 +112,7 @@ def _name(recording: 'rerun.RecordingStream', run: AnyRun) -> None:
     recording.log(_path(TRAJECTORY, run.controller, 'vehicle'), axes, static=True)
 
 
-def _send(recording: 'rerun.RecordingStream', run: AnyRun) -> int:
+def _send(recording: 'rerun.RecordingStream', run: Run) -> int:
     rr, count, line = library(), 0, []
     every = -(-run.samples // POINTS)
     for block in run.blocks():

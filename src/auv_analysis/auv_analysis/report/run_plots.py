@@ -29,7 +29,7 @@ from auv_analysis.report.wrench_plots import (
     is_drawn,
     leave_out,
 )
-from auv_analysis.runs.run import AnyRun
+from auv_analysis.runs.run import Run
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.model import control_model
 
@@ -37,7 +37,7 @@ SYMBOLS = {'delta_xi': 'Δξ', 'delta_pi': 'Δπ'}
 
 
 def draw_figures(
-    runs: Mapping[str, AnyRun | RunDigest],
+    runs: Mapping[str, Run | RunDigest],
     folder: Path,
     summaries: Mapping[str, Mapping[str, Any]] | None = None,
     limits: Mapping[str, np.ndarray | None] | None = None,

@@ -22,7 +22,7 @@ from auv_analysis.report.run_plots import draw_figures, reference
 from auv_analysis.report.scenario_text import SetUp, set_up
 from auv_analysis.report.verdict import verdict
 from auv_analysis.report.wrench_plots import estimate_finding
-from auv_analysis.runs.run import FOREIGN, AnyRun
+from auv_analysis.runs.run import FOREIGN, Run
 from auv_dynamics.vehicle import DOFS
 
 Texts = str | Mapping[str, str]
@@ -43,7 +43,7 @@ _SEVERAL = 'do', 'their errors reach'
 
 def write_report(
     out: Path,
-    runs: Mapping[str, AnyRun | RunDigest],
+    runs: Mapping[str, Run | RunDigest],
     summaries: Mapping[str, dict[str, Any]],
     scenario_text: Texts,
     vehicle_text: Texts,

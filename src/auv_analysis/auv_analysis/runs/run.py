@@ -261,9 +261,6 @@ class Run(RunInfo):
         return self.tau if self.applied is None else self.applied
 
 
-AnyRun = Run
-
-
 def rows_of(values: np.ndarray, keep: Any) -> np.ndarray:
     """Rows of an array; of one that is mapped from a file a copy, so that its pages can go again.
 

@@ -12,7 +12,7 @@ from auv_analysis.bag.load import Recording, open_bag
 from auv_analysis.bag.metadata import OTHERS, files_of, is_csv, is_mcap
 from auv_analysis.bag.step_topics import NotOursError
 from auv_analysis.output.folder import SWEEP
-from auv_analysis.runs.run import AnyRun, Hold
+from auv_analysis.runs.run import Hold, Run
 from auv_analysis.runs.samples import ENDING, load_samples
 from auv_analysis.scenario.scenario import Scenario, load_scenario
 from auv_analysis.simulation.simulate import announce, simulate
@@ -208,7 +208,7 @@ class Named(Protocol):
 class Opened(NamedTuple):
     """A run and the texts of its scenario and its vehicle, '' where they are not known."""
 
-    run: AnyRun
+    run: Run
     scenario_text: str
     vehicle_text: str
 

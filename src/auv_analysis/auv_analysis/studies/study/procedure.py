@@ -19,7 +19,7 @@ from auv_analysis.report import plots
 from auv_analysis.report.document import Block, Section, Sentence
 from auv_analysis.report.plots import Drawn, FigureRecord, HeatMap, save_figures
 from auv_analysis.report.results import Shown, Table, described, make_table
-from auv_analysis.runs.run import AnyRun, Run
+from auv_analysis.runs.run import Run
 from auv_analysis.studies.study.sensitivity import Kpi, Row, Sensitivity
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.model import ControlModel, control_model
@@ -273,7 +273,7 @@ def _of_controllers(out: Path, found: Sequence[Sensitivity]) -> Iterator[Block]:
         yield left_out
 
 
-def write_samples(run: AnyRun, path: Path) -> Path:
+def write_samples(run: Run, path: Path) -> Path:
     """Write a row for every sample, block by block.
 
     Parameters

@@ -24,7 +24,6 @@ from auv_analysis.studies.compare.ranking import (
     ERRORS,
     TABLE,
     Entry,
-    Ranking,
     comparison_table,
     rank,
     write_table,
@@ -117,7 +116,7 @@ def conclude_comparison(
     if report:
         with waiting('drawing figures, writing the report'):
             figures = draw(entries, table, ranking, out / 'figures')
-            write_comparison(out, entries, table, ranking, figures)
+            write_comparison(out, entries, table, figures)
     for entry in entries:
         for note in [entry.failure] if entry.failure else entry.summary['notes']:
             say(f'note: {entry.name}: {note}')
@@ -128,7 +127,6 @@ def write_comparison(
     out: Path,
     entries: Sequence[Entry],
     table: pa.Table,
-    ranking: Ranking,
     figures: Mapping[str, FigureRecord],
 ) -> Path:
     """Write report.html of a comparison; returns its path.
@@ -136,7 +134,7 @@ def write_comparison(
     Parameters
     ----------
     out : folder, existing
-    entries, table, ranking, figures : of the same runs
+    entries, table, figures : of the same runs
 
     """
     energy: list[Block] = [six_table(table, SHARES), figures['kinetic_energy']]

@@ -644,6 +644,16 @@ def test_in_real_time_it_has_the_time_when_it_came(tmp_path: Path, timers) -> No
     assert found['/clock'] == [(0, 0)]
 
 
+def test_in_real_time_what_comes_without_a_step_has_the_time_when_it_came(
+    tmp_path: Path, timers
+) -> None:
+    with program() as made:
+        node = recorder_in(made, tmp_path / 'bag', strict=False)
+        give(node, '/diagnostics', DiagnosticArray(), received_timestamp=7, source_timestamp=3)
+        made.drop(node)
+    assert times(tmp_path / 'bag')['/diagnostics'] == [(7, 3)]
+
+
 @pytest.mark.parametrize('limit', ['EARLY_COUNT', 'EARLY_SIZE', 'EARLY_TIME'])
 def test_what_waits_for_too_long_is_written_between_the_steps(
     tmp_path: Path, timers, monkeypatch: pytest.MonkeyPatch, limit: str

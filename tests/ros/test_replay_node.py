@@ -330,6 +330,15 @@ def test_who_cannot_be_asked_is_not_waited_for() -> None:
     assert made._is_answered(replay_publishers._Round({}))
 
 
+def test_a_subscriber_has_taken_all_with_its_second_answer() -> None:
+    made, asked = object.__new__(replay_publishers.Receivers), replay_publishers._Round({})
+    answer = SimpleNamespace(done=lambda: True)
+    one = SimpleNamespace(service_is_ready=lambda: True, call_async=lambda _: answer)
+    made._clients, made.silent = {'/x': one}, []
+    # asks, takes the answer, asks, takes the answer
+    assert [made._is_answered(asked) for _ in range(5)] == [False, False, False, False, True]
+
+
 def test_gives_up_a_subscriber_that_stays_silent(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr('auv_analysis.nodes.replay_publishers.PATIENCE', 0.5)
     domain = fresh_domain()

@@ -2,6 +2,7 @@
 
 import tracemalloc
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -231,3 +232,12 @@ def test_errors_that_are_never_far_from_zero_have_settled_at_once(run) -> None:
 @pytest.mark.parametrize(('seconds', 'split'), [(4.0, False), (4.1, True)])
 def test_the_first_phase_is_drawn_apart_where_more_than_it_follows(seconds, split) -> None:
     assert is_split(SimpleNamespace(duration=seconds)) is split
+
+
+def test_a_figure_is_laid_out_alike_in_both_files(tmp_path: Path) -> None:
+    drawn, saved = (plots.new_figure(3.0) for _ in range(2))
+    for figure in (drawn, saved):
+        figure.subplots().legend(handles=[], title='x', bbox_to_anchor=(1.0, 1.02))
+    drawn.draw_without_rendering()
+    plots.save(saved, tmp_path, 'x')
+    assert saved.axes[0].get_position().bounds == drawn.axes[0].get_position().bounds

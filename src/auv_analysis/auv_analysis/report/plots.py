@@ -107,7 +107,7 @@ def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     _few_colours(np.asarray(canvas.buffer_rgba())).save(png, dpi=(DPI, DPI))
-    figure.set_layout_engine('none')  # laid out once is enough
+    figure.set_layout_engine('none')  # anew, it would lie otherwise in the PDF
     dates = {'CreationDate': None, 'Creator': None, 'Producer': None}
     FigureCanvasPdf(figure).print_pdf(pdf, metadata=dates)
     return png, pdf

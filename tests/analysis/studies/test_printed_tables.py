@@ -80,7 +80,7 @@ def _vehicle(numbers) -> dict:
         'thrusters': {
             'names': ['T1', 'T2'], 'rank': 5, 'rotors': [],
             'largest': {dof: [-next(numbers), next(numbers)] for dof in DOFS[:5]} | {'yaw': None},
-            'unactuated': {'yaw': ['sway', 'roll']},
+            'unactuated': {'yaw': ['sway', 'roll'], 'heave': []},
         },
         'sampling': {
             law: {key: next(numbers) for key in ('k_D', 'rate', 'rings_above', 'unstable_above')}

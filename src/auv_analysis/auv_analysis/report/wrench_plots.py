@@ -204,7 +204,7 @@ def _rates(axes: Axes, run: RunDigest, part: str) -> bool:
         linear = max(last, beyond * 10.0**-DECADES)
     else:  # the bound alone is large: what it bounds keeps the linear part
         linear = max(largest, beyond * 10.0**-DECADES)
-    if beyond > 0 and beyond > RATES_APART * linear:
+    if beyond > RATES_APART * linear:
         plots.symmetric(axes, linear)
         return True
     return False

@@ -47,7 +47,11 @@ def test_command_compares_scenarios_by_name(scenarios, capsys) -> None:
     report = unescape((out / 'report.html').read_text(encoding='utf-8')).replace('\xa0', ' ')
     assert 'Durations differ: 0.4 s (3 runs) and 0.2 s (2 runs)' in report
     assert '1 of 6 runs failed and have no figures: wild/cl.' in report
-    assert any('wild/cl' in line and 'diverges' in line for line in captured.err.splitlines())
+    *notes, failed = [line for line in captured.err.splitlines() if line.startswith('note: ')]
+    assert notes == [f'note: {n}: {note}' for n, one in summaries.items() if one
+                     for note in one['notes']]  # fmt: skip
+    assert 'wild/cl' in failed
+    assert 'diverges' in failed
 
 
 @pytest.mark.usefixtures('unrendered')

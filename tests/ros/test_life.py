@@ -4,6 +4,7 @@ import math
 import subprocess
 import sys
 import threading
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -62,6 +63,19 @@ def test_all_that_has_arrived_before_the_end_is_taken() -> None:
         assert says.wait_for_all_acked(Duration(seconds=patience(30.0)))
         node_main._spin([node], made.executor, stop)
         assert len(taken) == 30
+
+
+def test_timers_that_are_faster_than_a_look_at_services_are_served_in_time(monkeypatch) -> None:
+    monkeypatch.setattr('time.monotonic', lambda: 7.0)
+
+    def next_look(*timers: tuple[float, float | None]) -> float:
+        made = [SimpleNamespace(timer_period_ns=period * 1e9, time_until_next_call=lambda s=left: s)
+                for period, left in timers]  # fmt: skip
+        return node_main._next_look([SimpleNamespace(timers=[one]) for one in made])
+
+    assert next_look() == next_look((0.05, 1e7), (1.0, 0.0)) == 7.05
+    assert next_look((0.04, None), (0.03, 2e7), (0.02, 1e7)) == 7.01
+    assert next_look((0.04, -5.0)) == 7.0
 
 
 @pytest.mark.parametrize(('loud', 'logged'), [(math.inf, [1, 4]), (0.0, [1, 2, 3, 4])])

@@ -197,9 +197,9 @@ def test_nobody_waits_for_it_and_it_does_not_start_a_run() -> None:
             answer = peer.call(Trigger, 'plant_node/ready')
             assert not answer.success
             assert answer.message == 'odom: expected 1 subscribers, found 0'
-            peer.listen(topics.ODOM)
-            beside.until(lambda: peer.heard['odom'])
-            assert peer.call(Trigger, 'plant_node/ready').success
+            strangers.append(Node('recorder_node', context=peer.context))  # of this graph
+            strangers[-1].create_subscription(topics.ODOM.type, '/odom', print, 10)
+            beside.until(lambda: peer.call(Trigger, 'plant_node/ready').success)
         finally:
             for stranger in strangers:
                 stranger.destroy_node()

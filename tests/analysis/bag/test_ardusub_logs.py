@@ -189,6 +189,25 @@ def test_messages_with_a_wrong_checksum_are_left_out_and_counted(run, pulses, tm
     assert 'x.tlog: 1 messages left out, whose checksum is wrong' in notes
 
 
+@pytest.mark.parametrize('version', [1, 2])
+def test_each_port_and_named_value_is_a_topic(version: int, run, pulses, tmp_path) -> None:
+    sent = logs.telemetry(run.part(slice(20)), pulses[:20])
+    last = sent[-1]
+    more = [
+        logs.mavlink.MAVLink_servo_output_raw_message(last[2].time_usec, 1, *[1500] * 16),
+        logs.mavlink.MAVLink_named_value_float_message(5, b'Depth', 1.0),
+        logs.mavlink.MAVLink_named_value_float_message(5, b'CamTilt', 2.0),
+    ]
+    sent += [(last[0], logs.VEHICLE, one) for one in more]
+    log = logs.write_tlog(tmp_path / 'x.tlog', sent, version)
+    counts = survey(log).counts
+    assert (counts['SERVO_OUTPUT_RAW'], counts['SERVO_OUTPUT_RAW[1]']) == (20, 1)
+    servos = [m.servo1_raw for _, _, m in messages(log, ['SERVO_OUTPUT_RAW'], [])]
+    assert servos == pulses[:20, 0].tolist()
+    (tilt,) = messages(log, ['NAMED_VALUE_FLOAT[CamTilt]'], [])
+    assert tilt.message.value == 2.0
+
+
 def test_servo_outputs_keep_their_clock_when_it_wraps(run, pulses, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(logs, 'BOOT', 2**32 // 1000 - 500)  # half a second before
     heard = logs.telemetry(run, pulses)

@@ -37,9 +37,9 @@ def test_every_number_stands_beside_its_name(capsys) -> None:
         ['topic', 'field', 'values', 'least', 'largest'],
         ['/odom', 'twist.u', '7', '-1.25', '3.5'],
         ['/odom', 'name', '6'],
+        ['note:', 'one', 'is', 'odd'],
         ['a', 'mapping', 'file', 'to', 'begin', 'with,', 'for', '--map:'],
         ['odometry:', '/odom'],
-        ['note:', 'one', 'is', 'odd'],
     ]
 
 

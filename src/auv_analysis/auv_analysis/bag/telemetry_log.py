@@ -22,6 +22,7 @@ MARKER = re.compile(b'[\xfd\xfe]')
 HEARTBEAT, ATTITUDE, SERVOS = 0, 30, 36  # ids
 NO_AUTOPILOT = b'\x08'
 WRAP = 1 << 32  # us: servo outputs tell the lower 32 bits of their time
+NAME = 10  # bytes of a name of a value
 TRIES = 10_000  # checksums that are worked out to find the next message behind damage
 
 
@@ -77,11 +78,11 @@ class TelemetryLog:
 
     def tallies(self, notes: list[str]) -> dict[str, TopicExtent]:
         """What there is of each message of the vehicle; that is whose autopilot is heard most."""
-        found: dict[tuple[int, int, int], TopicExtent] = {}
+        found: dict[tuple[int, int, str], TopicExtent] = {}
         heard: Counter[tuple[int, int]] = Counter()
         parameters = self._number('PARAM_VALUE')
         for frame in self._frames():
-            key = frame.system, frame.component, frame.number
+            key = frame.system, frame.component, self._topic(frame)
             count(found, key, frame.stamp * US, self._path)
             if frame.number == ATTITUDE:
                 self._note_boot(frame)
@@ -95,14 +96,14 @@ class TelemetryLog:
         if self._damaged:
             notes.append(self._said_of_damage(self._damaged))
         return {
-            self._name(number): tally
-            for (system, component, number), tally in sorted(found.items())
+            topic: tally
+            for (system, component, topic), tally in sorted(found.items())
             if (system, component) == self._vehicle
         }
 
     def _chosen(
         self,
-        found: Mapping[tuple[int, int, int], TopicExtent],
+        found: Mapping[tuple[int, int, str], TopicExtent],
         heard: Counter[tuple[int, int]],
         notes: list[str],
     ) -> tuple[int, int]:
@@ -128,14 +129,13 @@ class TelemetryLog:
     def messages(self, topics: Collection[str], notes: list[str]) -> Iterator[Message]:
         """Messages of some topics; those with a wrong checksum are left out and counted."""
         wrong = 0
-        numbers = {self._number(topic): topic for topic in topics}
+        numbers = {self._number(topic.partition('[')[0]) for topic in topics}
         for frame in self._frames():
-            topic = numbers.get(frame.number)
             if (frame.system, frame.component) != self._vehicle:
                 continue
             if frame.number == ATTITUDE:
                 self._note_boot(frame)
-            if topic is None:
+            if frame.number not in numbers or (topic := self._topic(frame)) not in topics:
                 continue
             message = self._decoded(frame)
             if message is None:
@@ -154,9 +154,23 @@ class TelemetryLog:
     def _said_of_damage(self, count: int) -> str:
         return f'{self._path.name}: damaged: {count} bytes are no messages'
 
-    def _name(self, number: int) -> str:
-        known = self._library.mavlink_map.get(number)
-        return str(known.msgname) if known else f'message {number}'
+    def _topic(self, frame: Frame) -> str:
+        """Type of a message; behind it which port, sensor or value, where that is not number 0."""
+        known = self._library.mavlink_map.get(frame.number)
+        if known is None:
+            return f'message {frame.number}'
+        name, key = str(known.msgname), known.instance_field
+        if key is None:
+            return name
+        kind, begin = known.fieldtypes[known.fieldnames.index(key)], known.instance_offset
+        width = NAME if kind == 'char' else int(re.sub(r'\D', '', kind)) // 8
+        end = min(begin + width, self._data[frame.start + 1])  # zeros at the end are not sent
+        told = self._data[frame.payload + begin : frame.payload + end]
+        if kind == 'char':
+            instance = told.partition(b'\0')[0].decode('latin-1')
+        else:
+            instance = str(int.from_bytes(told, 'little') or '')
+        return f'{name}[{instance}]' if instance else name
 
     def _number(self, topic: str) -> int:
         """Id of a message type; -1 of an unknown one."""

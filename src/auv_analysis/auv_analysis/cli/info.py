@@ -75,8 +75,8 @@ def _print_info(document: dict[str, Any]) -> None:
             fields.add_row(topic, path, str(span['values']), *ends)
     if fields.rows:
         out.print(fields)
+    for note in document['notes']:
+        out.print(f'note: {note}')
     if document['mapping']:
         out.print('a mapping file to begin with, for --map:\n')
         out.print(document['mapping'], soft_wrap=True, markup=False)
-    for note in document['notes']:
-        out.print(f'note: {note}')

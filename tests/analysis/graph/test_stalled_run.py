@@ -8,6 +8,7 @@ import psutil
 import pytest
 
 from auv_analysis import load_scenario
+from auv_analysis.bag.metadata import METADATA, as_text
 from auv_analysis.graph import experiment
 from auv_analysis.graph.experiment import PACKAGES, SILENCE, SPIN, run_controller
 from auv_analysis.graph.supervisor import NodeDiedError
@@ -55,6 +56,29 @@ def test_a_node_that_hangs_ends_a_run_and_is_named(silent: str, tmp_path: Path) 
     expected = f'no step after 5 for 60 s, and no sign of life of {silent}$'
     with pytest.raises(NodeDiedError, match=expected):
         watch(lambda graph: stalls(graph, silent), tmp_path)
+
+
+@pytest.mark.parametrize('composed', [False, True])
+def test_a_recorder_that_a_signal_ends_has_not_finished_the_run(
+    composed: bool, tmp_path: Path
+) -> None:
+    graph = Graph(looks=0, does=lambda _: None, alive=set())
+    told = {'topic_metadata': {'name': '/wrench'}, 'message_count': 8}
+    text = as_text({'topics_with_message_count': [told]})
+
+    def begin(command: list[str], **options: object) -> psutil.Popen:
+        (tmp_path / 'gvc' / METADATA).write_text(text)
+        if Path(command[0]).name not in ('recorder_node', 'composed_graph'):
+            return psutil.Popen(['sleep', '600'], **options)
+        ended = psutil.Popen(['true'], **options)
+        ended.wait()
+        return ended
+
+    steps: list[int] = []
+    given = load_scenario('case1'), 'gvc', tmp_path, 0, graph, begin, steps.append
+    with pytest.raises(NodeDiedError, match='ended at step 7 of 3000'):
+        run_controller(*given, composed=composed)
+    assert steps == [7]
 
 
 def test_a_run_that_is_paused_goes_on(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from auv_analysis.bag.metadata import METADATA, ROOT
 from auv_analysis.graph.node_parameters import (
     ANALYSIS,
     CONTROLLER,
@@ -24,6 +25,8 @@ from auv_analysis.graph.supervisor import (
     executable,
 )
 from auv_analysis.scenario.scenario import Scenario, write_inputs
+from auv_dynamics.files.yaml_files import read_yaml
+from auv_dynamics.ros.interface import WRENCH
 from auv_dynamics.ros.security import enclave, loopback
 
 if TYPE_CHECKING:
@@ -114,6 +117,10 @@ def run_controller(
             supervisor.start(name, command, observes=name in OBSERVERS)
         _start(supervisor, last, graph)
         _follow(supervisor, last, graph, scenario, progress)
+        progress(step := _last_step(bag))
+        if step < scenario.steps:  # a signal from elsewhere ends a node with exit code 0 as well
+            lines = supervisor.last_lines(last)
+            raise NodeDiedError(f'{last} ended at step {step} of {scenario.steps}{lines}')
         said = supervisor.complaints(COMPOSED if composed else CONTROLLER, CONTROLLER)
     finally:
         supervisor.stop(last)
@@ -166,4 +173,10 @@ def _follow(
             done_since = done_since or time.monotonic()
             if time.monotonic() - done_since > END_TIMEOUT:
                 raise NodeDiedError(f'{last} does not close the bag{supervisor.last_lines(last)}')
-    progress(scenario.steps)
+
+
+def _last_step(bag: Path) -> int:
+    """Number of the last step whose wrench is in a closed bag; -1: of none."""
+    told = read_yaml(bag / METADATA, 'metadata')[ROOT]['topics_with_message_count']
+    counts = {one['topic_metadata']['name']: one['message_count'] for one in told}
+    return int(counts.get(f'/{WRENCH}', 0)) - 1

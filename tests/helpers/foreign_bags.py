@@ -121,15 +121,16 @@ def write(path: Path, messages: Iterable[Message], maker: Maker, *, kind: str = 
     listed = sorted(messages, key=lambda message: message[1])
     if kind == 'bag':
         path = path.with_suffix('.bag')
-        return _written(path, Writer1(path), listed, maker.store.serialize_ros1, maker)
+        return written(path, Writer1(path), listed, maker.store.serialize_ros1, maker)
     plugin = {'mcap': StoragePlugin.MCAP, 'sqlite3': StoragePlugin.SQLITE3}[kind]
     writer = Writer2(path, version=8, storage_plugin=plugin)
-    return _written(path, writer, listed, maker.store.serialize_cdr, maker)
+    return written(path, writer, listed, maker.store.serialize_cdr, maker)
 
 
-def _written(
+def written(
     path: Path, writer: Any, messages: list[Message], serialize: Callable, maker: Maker
 ) -> Path:
+    """Write messages in their order."""
     connections: dict[str, Any] = {}
     with writer:
         for topic, log, message in messages:

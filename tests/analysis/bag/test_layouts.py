@@ -18,9 +18,14 @@ from helpers.foreign_bags import (
     simulated,
     write,
     write_chunks,
+    written,
 )
 from numpy.testing import assert_allclose
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
+from auv_analysis.bag.load import load_run
+from auv_analysis.replay.played_bag import index_bag
+from auv_analysis.replay.played_bag import messages as played_messages
 from auv_analysis.runs.run import Run
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
@@ -177,6 +182,20 @@ def test_an_mcap_that_was_not_finished_is_read_as_far_as_it_goes(run, tmp_path) 
     found = loaded(file, **keys)
     assert 'was not finished' in found.notes[0]
     assert 1 < found.samples < run.samples
+
+
+def test_messages_that_were_compressed_one_by_one(run, tmp_path) -> None:
+    maker, m = Maker(), motion(run, enu=False)
+    ours = simple(m, maker, '/odom', '/wrench', ('odom_ned', 'base_link_fsd'))
+    bag = tmp_path / 'bag'
+    writer = Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
+    written(bag, writer, ours, maker.store.serialize_cdr, maker)
+    found = loaded(bag, odometry='/odom', wrench='/wrench')
+    assert_allclose(found.nu, run.nu, atol=1e-9)
+    assert_allclose(load_run(bag, 'rexrov').tau, run.tau)
+    played = list(played_messages(index_bag(bag), ['/odom', '/wrench']))
+    assert {message.data[:4] for message in played} == {b'\0\1\0\0'}
 
 
 def test_mcap_of_ros_1(run, tmp_path) -> None:

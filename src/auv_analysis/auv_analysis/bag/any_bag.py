@@ -129,7 +129,7 @@ def _of_mcap(
             for i, channel in enumerate(item.channels.tolist()):
                 if channel in wanted and taken(wanted[channel][0]):
                     topic, decode = wanted[channel]
-                    message = decoded(path, topic, decode, item.payload(i))
+                    message = decoded(path, topic, decode, item.message(i))
                     yield LoggedMessage(topic, int(item.log_times[i]), message)
 
 

@@ -12,7 +12,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from auv_analysis.bag.limits import Counts
+from auv_analysis.bag.limits import Counts, plain
 
 HEAD = np.dtype([
     ('opcode', 'u1'), ('length', '<u8'), ('channel', '<u2'), ('sequence', '<u4'),
@@ -69,9 +69,13 @@ class MessageTable(NamedTuple):
     publish_times: np.ndarray
 
     def payload(self, i: int) -> bytes:
-        """Message i, serialized."""
+        """Message i as it stands in the file."""
         start = int(self.starts[i])
         return self.data[start : start + int(self.sizes[i])]
+
+    def message(self, i: int) -> bytes:
+        """Message i, serialized."""
+        return plain(self.payload(i))
 
 
 def table_at(data: bytes, places: np.ndarray) -> MessageTable:

@@ -1,6 +1,7 @@
 """How much a bag may make us hold: sizes and counts are checked before anything is made of them."""
 
 import zlib
+from contextlib import suppress
 from typing import Any
 
 import lz4.frame
@@ -21,6 +22,7 @@ LARGEST_RECORD: dict[int, int] = {
 }
 LARGEST_OTHER = 64 * MIB  # bytes of a schema, of metadata and of what is not known
 LARGEST_DECODED = 2 * MIB  # bytes of a message, which may become a hundred times as many
+DENSEST = 100  # times smaller than it is: the best compressed message above that size
 LARGEST_PARSED = MIB // 4  # bytes of the definitions of types that are parsed, of a file
 MOST_RECORDS = 1 << 21  # in a chunk; a chunk of 64 MiB holds so many of the smallest messages
 FREE_RECORDS = 1 << 17  # in all chunks of a file, beside one per byte of it
@@ -137,3 +139,18 @@ def _decompress(chunk: Chunk, size: int) -> bytes:
     if chunk.compression:
         raise McapError(f'unknown compression {chunk.compression!r}')
     return chunk.data
+
+
+def plain(message: bytes) -> bytes:
+    """A message as it was published, where rosbag2 has compressed each by itself.
+
+    The file does not say so, but CDR begins with a zero. What cannot be decompressed, or would
+    become very much more, stays as it is.
+    """
+    if not message.startswith(zstandard.FRAME_HEADER):
+        return message
+    with suppress(zstandard.ZstdError):
+        most = max(LARGEST_DECODED, DENSEST * len(message))
+        if 0 <= zstandard.frame_content_size(message) <= most:
+            return zstandard.ZstdDecompressor().decompress(message)
+    return message

@@ -321,7 +321,7 @@ class FileReader:
         self, table: MessageTable, channel: int, index: np.ndarray, first: int
     ) -> Series | None:
         """Stamps and rows of a channel; None where its messages must be looked at one by one."""
-        topic, like = self._topic(channel), table.payload(index[0])
+        topic, like = self._topic(channel), table.message(index[0])
         layout = self._layouts.get(channel)
         if layout is None or not layout.fits(like):
             layout = learned(like, role_of(topic), self._decoders[channel])

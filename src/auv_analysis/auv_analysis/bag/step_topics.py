@@ -127,7 +127,7 @@ class Decoding:
     def message(self, table: MessageTable, i: int, channel: int) -> Any:
         """Message number i of a table."""
         try:
-            return self._decoders[channel](table.payload(i))
+            return self._decoders[channel](table.message(i))
         except Exception as error:  # by its schema, a message may be anything
             raise refusal(
                 self._path, self._topics[channel], 'messages of its type', error

@@ -222,7 +222,7 @@ def _of_file(
         for i in _inside(item, begin, end):
             topic = opened.channels[int(item.channels[i])].topic
             if topic in topics:
-                message = PlayedMessage(int(item.log_times[i]), topic, item.payload(i))
+                message = PlayedMessage(int(item.log_times[i]), topic, item.message(i))
                 heapq.heappush(waiting, (message.ns, next(order), message))
         sure = file.least[tables] if tables < len(file.least) else math.inf
         while waiting and waiting[0][0] <= sure:

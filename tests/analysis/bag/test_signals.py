@@ -65,6 +65,15 @@ def test_of_a_clock_that_begins_anew_the_longest_stretch_is_read() -> None:
     assert longest_stretch(small, notes) is small, 'a late message is no new beginning'
 
 
+def test_parts_that_stand_in_another_order_are_one_recording() -> None:
+    parts, notes = [5, 6, 7, 2, 3, 4, 8, 9, 10], list[str]()
+    swapped = recorded(np.array(parts) * SECOND)
+    assert longest_stretch(swapped, notes) is swapped
+    assert not notes
+    paused = recorded(np.array([12, 13, 14, *parts]) * SECOND)
+    assert len(longest_stretch(paused, notes).stamps) < 12, 'two seconds later: another run'
+
+
 def test_a_single_message_of_another_time_is_left_out_and_counted() -> None:
     notes: list[str] = []
     seconds = np.array([10, 11, 12, 0, 14, 15, 900, 17, 18])
@@ -74,8 +83,9 @@ def test_a_single_message_of_another_time_is_left_out_and_counted() -> None:
                      'them']  # fmt: skip
     in_turn = longest_stretch(recorded(np.array([0, 900, 1, 901, 2, 902]) * SECOND), notes)
     assert_array_equal(in_turn.rows[:, 0], [0, 1])
-    little = longest_stretch(recorded(np.array([990, 1000, 885, 910, 940]) * SECOND // 100), notes)
-    assert len(little.rows) == 3, 'a clock that begins anew by little'
+    little = np.array([990, 1000, 885, 910, 940]) * SECOND // 100
+    found = longest_stretch(recorded(little, log=990 + np.arange(5)), notes)
+    assert len(found.rows) == 3, 'a clock that begins anew by little'
 
 
 def test_a_pause_makes_no_bursts() -> None:

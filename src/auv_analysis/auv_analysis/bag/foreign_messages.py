@@ -1,6 +1,7 @@
 """Mapped topics of a bag as arrays: which numbers a message holds, stamps put in order."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from auv_analysis.bag.foreign_fields import (
 )
 from auv_analysis.bag.foreign_topics import HELD, MappedTopic, TopicMap, other_odometries
 from auv_analysis.bag.metadata import is_csv
-from auv_analysis.bag.reading import strays, stretches
+from auv_analysis.bag.reading import BACK, strays, stretches
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant
 from auv_dynamics.ros.interface import NANOSECONDS
@@ -92,7 +93,7 @@ def longest_stretch(of: Recorded, notes: list[str]) -> Recorded:
     of = of.part(~stray) if stray.any() else of
     edges = stretches(of.stamps)
     times = len(edges) - 2
-    if not times:
+    if not times or _is_one_clock(of):
         return of
     i = int(np.argmax(np.diff(edges)))
     kept = of.part(slice(*edges[i : i + 2]))
@@ -103,6 +104,17 @@ def longest_stretch(of: Recorded, notes: list[str]) -> Recorded:
         f'left {len(of.stamps) - len(kept.stamps)} messages'
     )
     return kept
+
+
+def _is_one_clock(of: Recorded) -> bool:
+    """Whether parts that were logged right after one another only stand in another order.
+
+    Chunks and files may; where a clock began anew, the parts overlap or are apart.
+    """
+    parts = np.split(of.log, np.flatnonzero(np.abs(np.diff(of.log)) > BACK) + 1)
+    spans = sorted((part.min(), part.max()) for part in parts)
+    joined = all(0 < other[0] - one[1] <= BACK for one, other in pairwise(spans))
+    return joined and len(stretches(of.stamps[np.argsort(of.log, kind='stable')])) == 2
 
 
 def logged_with(of: Recorded, clock: Recorded) -> Recorded:

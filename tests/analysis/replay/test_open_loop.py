@@ -88,6 +88,15 @@ def test_it_is_the_sampled_law(tmp_path: Path, law: str, late: int) -> None:
     assert not found.trouble
 
 
+def test_files_in_another_order_are_put_in_order(tmp_path: Path) -> None:
+    whole = open_loop(recorded_loop(write(tmp_path / 'whole.mcap')), 'gvc', GAINS)
+    split = tmp_path / 'split'
+    split.mkdir()
+    write(split / 'bag_0.mcap', lost=tuple(range(COUNT // 2)))
+    write(split / 'bag_1.mcap', lost=tuple(range(COUNT // 2, COUNT)))
+    np.testing.assert_array_equal(open_loop(recorded_loop(split), 'gvc', GAINS).tau, whole.tau)
+
+
 def test_odometry_that_is_missing_is_integrated_over(tmp_path: Path) -> None:
     loop = recorded_loop(write(tmp_path / 'bag.mcap', lost=(3, 4)))
     keep = [k for k in range(COUNT) if k not in (3, 4)]

@@ -185,9 +185,13 @@ def recorded_loop(bag: str | Path, vehicle: str | Path | None = None) -> Recorde
         raise NotOursError(bag, interface.CMD_VEL, 'messages', ', '.join(sorted(contents.types)))
     parameters = attachments.parameters_of(contents, bag)
     known, own = attachments.vehicle_of(contents, bag, vehicle), parameters.get(CONTROLLER, {})
+    controller = RecordedController(own, known, bag, derivatives=interface.CMD_ACCEL in series)
+    if controller.settings.lockstep:  # whose clock never begins anew: only chunks may be swapped
+        orders = {role: np.argsort(ns, kind='stable') for role, (ns, _) in series.items()}
+        series = {role: (ns[orders[role]], x[orders[role]]) for role, (ns, x) in series.items()}
     return RecordedLoop(
         series,
-        RecordedController(own, known, bag, derivatives=interface.CMD_ACCEL in series),
+        controller,
         attachments.scenario_name(contents, bag),
         attachments.controller_name(parameters, bag),
         tuple(contents.notes),

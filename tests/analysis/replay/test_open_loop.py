@@ -42,6 +42,7 @@ def rows(count: int, width: int) -> np.ndarray:
 
 def write(
     path: Path, *, late: int = 0, accel: bool = True, lost: tuple = (), params: dict | None = None,
+    namespace: str = '',
 ) -> Path:  # fmt: skip
     """Bag of a controller's messages; set-points are logged `late` steps behind their stamps."""
     bag = Bag(path)
@@ -53,15 +54,20 @@ def write(
     for k in range(COUNT):
         ns = k * STEP
         if k not in lost:
-            bag.add('/odom', ODOMETRY, ns, serialized(odometry(ns, x[k])))
-        bag.add('/wrench', WRENCH, ns, serialized(stamped('Wrench', ns, np.full(6, 1.0 * k))))
+            bag.add(f'{namespace}/odom', ODOMETRY, ns, serialized(odometry(ns, x[k])))
+        bag.add(
+            f'{namespace}/wrench',
+            WRENCH,
+            ns,
+            serialized(stamped('Wrench', ns, np.full(6, 1.0 * k))),
+        )
     for k in range(COUNT):
         ns = k * STEP
         data = serialized(stamped('Twist', ns, nu_d[k]))
-        bag.add('/cmd_vel', TWIST, ns + late * STEP, data)
+        bag.add(f'{namespace}/cmd_vel', TWIST, ns + late * STEP, data)
         if accel:
             data = serialized(stamped('Accel', ns, slope[k]))
-            bag.add('/cmd_accel', ACCEL, ns, data)
+            bag.add(f'{namespace}/cmd_accel', ACCEL, ns, data)
     return bag.close()
 
 
@@ -303,6 +309,22 @@ def test_a_law_is_asked_with_the_vehicle_that_is_given(tmp_path, monkeypatch) ->
     with pytest.raises(SystemExit):
         main.main(['replay', str(bag), '--law', 'cl', '--vehicle', 'rexrov'])
     assert asked == ['rexrov']
+
+
+def test_of_several_vehicles_one_is_named(tmp_path: Path, capsys) -> None:
+    bag = tmp_path / 'bag'
+    bag.mkdir()
+    write(bag / 'bag_0.mcap', namespace='/auv1')
+    write(bag / 'bag_1.mcap', namespace='/auv2')
+    asked = ['replay', str(bag), '--law', 'gvc', '--out', str(tmp_path / 'out')]
+    with pytest.raises(SystemExit) as ended:
+        main.main(asked)
+    assert ended.value.code == 2
+    assert '--namespace with that of one, found /auv1, /auv2' in capsys.readouterr().err
+    assert recorded_loop(bag, namespace='/auv2').samples == COUNT
+    with pytest.raises(SystemExit) as ended:
+        main.main([*asked, '--namespace', '/auv2', '--json'])
+    assert json.loads(capsys.readouterr().out)['samples'] == COUNT
 
 
 @pytest.mark.parametrize(

@@ -32,8 +32,8 @@ KEYS = 'space: pause, go on; right: a step; up, down: faster, slower; q: end'
 DOCUMENT = 'open_loop.json'
 NANOSECONDS = 1e9
 PLAYED = (
-    'rate', 'start', 'duration', 'loop', 'paused', 'skip_gaps', 'topics', 'namespace',
-    'original_names', 'commands', 'force_commands', 'all', 'no_clock', 'expect', 'answers',
+    'rate', 'start', 'duration', 'loop', 'paused', 'skip_gaps', 'topics', 'original_names',
+    'commands', 'force_commands', 'all', 'no_clock', 'expect', 'answers',
     'domain_id',
 )  # fmt: skip
 
@@ -55,7 +55,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     text = 'recorded names or patterns; default: all'
     add('--topics', nargs='+', metavar='TOPIC', help=text)
     names = command.add_mutually_exclusive_group()
-    text = 'before the recorded names; default: replay'
+    text = 'before the recorded names, default: replay; with --law that of the recorded vehicle'
     names.add_argument('--namespace', metavar='NAME', help=text)
     names.add_argument('--original-names', action='store_true', help='as they were recorded')
     text = 'commands as well where a vehicle may listen: outside of /replay'
@@ -241,7 +241,7 @@ def _open_loop(options: argparse.Namespace) -> dict[str, Any]:
         check_free(options.out, overwrite=options.overwrite, inputs=[options.bag])
     import_law(options.law)
     with waiting(f'reading {options.bag}'):
-        recorded = recorded_loop(options.bag, options.vehicle)
+        recorded = recorded_loop(options.bag, options.vehicle, options.namespace)
     document, both = ask_law(recorded, options.law, dict(options.gain or ()), _answers)
     document['bag'] = str(options.bag)
     law = options.law.replace(':', '_').replace('.', '_').replace('/', '_')

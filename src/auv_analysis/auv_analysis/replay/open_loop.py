@@ -165,20 +165,23 @@ class OpenLoop:
     notes: tuple[str, ...] = ()
 
 
-def recorded_loop(bag: str | Path, vehicle: str | Path | None = None) -> RecordedLoop:
+def recorded_loop(
+    bag: str | Path, vehicle: str | Path | None = None, namespace: str | None = None
+) -> RecordedLoop:
     """What the controller of a bag was told and said.
 
     Parameters
     ----------
     bag : folder or .mcap file
     vehicle : vehicle file for a bag that does not carry its own
+    namespace : of the vehicle; None: that of the recorder, or the only one in the bag
 
     Raises
     ------
     InputError : no bag, no vehicle, no set-points, or topics of another system
 
     """
-    bag, contents = Path(bag), read_bag(bag)
+    bag, contents = Path(bag), read_bag(bag, namespace)
     topics = topics_of_one_graph(contents, bag)
     series = {role: contents.messages[topic] for role, topic in topics.items()}
     if interface.CMD_VEL not in series:

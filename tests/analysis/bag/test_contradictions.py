@@ -235,6 +235,19 @@ def test_a_delay_is_found_beside_couplings_and_noise_and_none_where_there_is_non
         assert found is None
 
 
+def test_a_smooth_motion_tells_no_delay_of_its_wrench() -> None:
+    run = simulated(duration=20.0).part(np.delete(np.arange(2001), [5, 77, 1000]))
+    seen, ns = motion(run, enu=False), nanoseconds(run.t)
+    pose, twist, wrench = (
+        Track(role, '', ns, rows, np.inf, held=role == 'wrench')
+        for role, rows in (
+            ('pose', np.column_stack([seen.position, np.roll(seen.attitude, 1, axis=1)])),
+            ('twist', run.nu), ('wrench', run.tau),
+        )
+    )  # fmt: skip
+    assert acts_behind(pose, twist, wrench) is None
+
+
 def test_a_wrench_of_zeros_is_named(run, tmp_path) -> None:
     none = replace(run, tau=0.0 * run.tau)
     found = loaded(bag_of(run, tmp_path, tau=none), **KEYS)

@@ -32,6 +32,7 @@ WORSE = 2.0  # times: from here on the other reading fits clearly better
 SMOOTH = 0.3  # s over which rates are fitted that are held against each other in time
 SMOOTHER = 0.6, 1.0  # s, the same of a wrench: noise that the controller answers brings it forward
 TOLD = 0.9  # of the acceleration that nothing else explains: what a wrench must explain of it
+LEFT = 1e-4  # of the variance of the acceleration: less unexplained is the error of the filter
 SEEN = 0.5  # of the variance of a rate: what a velocity must explain of it; noise explains none
 FARTHEST, FINE = 1.0, 0.01  # s: delays that are tried, and between them
 COARSE = 5  # times as far apart at first: what is compared is smooth over many times that
@@ -286,6 +287,8 @@ def _acts_behind(
         return values - Q @ (Q.T @ values)
 
     y = rest(nu_dot[inside] / np.where(scale > 0, scale, 1.0))
+    if (y**2).mean() < LEFT:
+        return None
 
     def left(delay: float) -> np.ndarray:
         X = rest(np.stack([np.interp(t[inside] - delay, t, column) for column in tau.T], axis=1))

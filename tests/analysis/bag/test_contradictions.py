@@ -173,6 +173,17 @@ def test_a_velocity_of_a_turning_vehicle_is_late_in_the_axes_it_was_sent_in() ->
         assert value == pytest.approx(0.24, abs=3.0 * max(error, 0.005)), frame
 
 
+@pytest.mark.parametrize('first', range(0, 2000, 200))
+def test_some_seconds_tell_no_delay(first: int, run) -> None:
+    short = run.part(slice(first, first + 400))
+    seen, ns = motion(short, enu=False), nanoseconds(short.t)
+    turned = np.column_stack([seen.position, np.roll(seen.attitude, 1, axis=1)])
+    nu = short.nu + np.random.default_rng(first).normal(0.0, 1e-3, short.nu.shape)
+    pose, twist = (Track(role, '', ns, rows, np.inf, held=False)
+                   for role, rows in (('pose', turned), ('twist', nu)))  # fmt: skip
+    assert delays({'pose': pose, 'twist': twist}, 'child') == []
+
+
 def test_the_frame_is_that_of_the_topic_with_the_linear_velocity() -> None:
     """Rates of a gyroscope come first, in body axes."""
     tracks = planar(lambda t: 0.5, lambda t: 0.5, 0.24, 0, 'world', 0.2)

@@ -232,7 +232,7 @@ def behind(t: np.ndarray, path: np.ndarray, velocity: np.ndarray) -> Delay | Non
     whole = cumulative_trapezoid(velocity, t, axis=0, initial=0.0)
     early, late = _rates(t, SMOOTH, path, whole)
     inside = (t > t[0] + FARTHEST) & (t < t[-1] - FARTHEST)
-    if inside.sum() < PARTS:
+    if inside.sum() < PARTS or np.ptp(t[inside]) < PARTS * SMOOTH:  # within a filter all is one
         return None
 
     def left(delay: float) -> np.ndarray:

@@ -12,7 +12,9 @@ from typing import NamedTuple
 from cosmic_ray.mutating import mutate_and_test
 from cosmic_ray.work_item import MutationSpec, TestOutcome, WorkerOutcome
 
-COPIED = ('src', 'tests', 'config', 'docs', 'examples', 'pyproject.toml', 'README.md')
+COPIED = (
+    'src', 'tests', 'config', 'docs', 'examples', 'benchmarks', 'pyproject.toml', 'README.md',
+)  # fmt: skip
 SKIPPED = shutil.ignore_patterns('__pycache__', 'node_modules', '*.egg-info')
 PATIENCE = 240.0  # s, after which a mutant that does not end counts as killed
 PYTEST = '-m pytest -x -q --assert=plain -p no:cacheprovider'

@@ -15,7 +15,7 @@ from driver import COMPONENT, Driver
 from helpers.mavlink_relay import Relay, fork_program, free_port, start_program
 from helpers.node_processes import PATIENCE, Peer, fresh_domain, parameters, stop
 from helpers.nodes_in_process import program
-from helpers.patience import patience
+from helpers.patience import FACTOR, patience
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from std_srvs.srv import SetBool
 from udp import UdpPort
@@ -43,7 +43,7 @@ class Sea:
         self.driver = start(
             'driver.py', self.domain, '--ros-args',
             *parameters(connection=f'udpin:127.0.0.1:{port}', autoarm=True),
-            *parameters(disarm_timeout=patience(1.0)),
+            *parameters(disarm_timeout=patience(1.0), rate=50.0 / FACTOR**0.5),
         )  # fmt: skip
         self.vehicle = self.launch()
         self.peer = Peer(self.domain)

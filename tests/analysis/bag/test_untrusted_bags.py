@@ -18,7 +18,7 @@ from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Message, Schema
 
 from auv_analysis import load_scenario
-from auv_analysis.bag import attachments, limits, mcap_file, metadata
+from auv_analysis.bag import attachments, chunks, limits, mcap_file, metadata
 from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.chunks import Body
 from auv_analysis.bag.load import load_run
@@ -374,3 +374,13 @@ def test_a_metadata_yaml_of_sqlite_whose_aliases_explode(tmp_path: Path) -> None
     (tmp_path / 'metadata.yaml').write_text(LAUGHS.format(''))
     with pytest.raises(InputError, match='with all aliases written out'):
         survey(tmp_path)
+
+
+def test_a_chunk_ends_with_its_last_record_unless_there_are_more_than_are_looked_at() -> None:
+    record = chunks.PREFIX.pack(5, 3) + b'abc'
+    cut = 3 * record + record[:-1]
+    assert chunks._places(cut, 2).tolist() == [0, 12, 24]
+    for most in (4, 9):
+        with pytest.raises(McapError, match='ends within a record'):
+            chunks._places(cut, most)
+    assert chunks._places(3 * record, 3).tolist() == [0, 12, 24]

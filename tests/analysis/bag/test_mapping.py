@@ -14,6 +14,7 @@ WRONG = {  # what is in the file -> what the one line says
     'pose: /p\nwrench: /w\n': 'pose: expected odometry (--odom), or both pose and twist',
     f'{GOOD}twist: /t\n': 'found odometry and twist',
     f'{GOOD}thrusters: /u\n': 'wrench: expected one of wrench (--wrench) and thrusters, found w',
+    'odometry: /o\nthrusters: {topic: /u, units: m/s}\n': 'units: expected one of N, kN, kgf',
     f'{GOOD}odom: /o\n': 'odom: expected one of format, name, vehicle, frames',
     f'{GOOD}frames: enu\n': 'frames: expected ned_fsd or enu_flu (nearest: enu_flu), found enu',
     f'{GOOD}frames: [enu_flu]\n': 'frames: expected ned_fsd or enu_flu, found [',

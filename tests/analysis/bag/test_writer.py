@@ -38,6 +38,9 @@ def test_metadata_say_when_a_bag_begins_and_how_long_it_is(tmp_path: Path) -> No
     for one in (whole, *whole['files']):
         assert one['starting_time'] == {'nanoseconds_since_epoch': 1000 * STEP}
         assert one['duration'] == {'nanoseconds': 29 * STEP}
+    assert [key for key in whole if not whole[key]] == [
+        'compression_format', 'compression_mode', 'custom_data',
+    ]  # fmt: skip
 
 
 def writer_of(folder: Path, **storage: object) -> BagWriter:

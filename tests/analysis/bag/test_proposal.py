@@ -202,6 +202,19 @@ def test_names_of_fields(topic, path, component) -> None:
     assert component_of(topic, path) == component
 
 
+def test_how_sure_a_value_is_is_no_value() -> None:
+    assert component_of('log', 'roll') == 'phi'
+    for word in ['cov', 'covariance', 'std', 'stddev', 'var', 'variance', 'err', 'error', 'sigma']:
+        assert not component_of('log', f'roll_{word}'), word
+
+
+def test_pictures_alone_are_not_looked_at() -> None:
+    kinds = ('sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage')
+    contents = BagContents(types={f'/{i}': kind for i, kind in enumerate(kinds)})
+    found = looked_through(Path('no bag'), contents)
+    assert [(one.kind, one.spans) for one in found.values()] == [(kind, {}) for kind in kinds]
+
+
 def test_info_shows_columns_and_the_mapping(run, tmp_path, capsys) -> None:
     path = tmp_path / 'dive.csv'
     path.write_text(HEADS['plain'][0] + text_of(columns(run)))

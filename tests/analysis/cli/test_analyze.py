@@ -13,6 +13,7 @@ from made_bags import make_bag
 from auv_analysis.bag import reading
 from auv_analysis.bag.step_topics import ODOMETRY, TWIST, WRENCH
 from auv_analysis.cli import analyze, main
+from auv_analysis.cli.arguments import topic_map
 from auv_analysis.output.folder import sha256_of, write_manifest
 from auv_dynamics.files.errors import InputError
 
@@ -83,3 +84,13 @@ def test_of_many_bags_the_vehicle_is_heard_and_that_no_report_is_wanted(tmp_path
     main.main(['analyze', *many, '--vehicle', 'rexrov', '--no-report', '--out', str(out)])
     assert (out / 'summary.json').exists()
     assert not (out / 'report.html').exists()
+
+
+def test_what_is_told_of_a_bag_of_another_system_makes_its_mapping() -> None:
+    told = ['--odom', '/o', '--wrench', '/w', '--frames', 'enu_flu', '--twist-frame', 'world']
+    found = topic_map(main.parser().parse_args(['analyze', 'bag', *told]))
+    assert found is not None
+    both = found.sources['odometry'], found.sources['wrench']
+    assert [one.topic for one in both] == ['/o', '/w']
+    assert [one.frames for one in both] == ['enu_flu', 'enu_flu']
+    assert both[0].twist_frame == 'world'

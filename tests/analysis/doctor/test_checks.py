@@ -213,7 +213,8 @@ def test_left_over_segments_are_counted_and_those_in_use_are_not(tmp_path, monke
 def test_full_or_absent_shared_memory_is_said(free, verdict, tmp_path, monkeypatch):
     _one(lambda: checks.shared_memory(tmp_path / 'gone'), 'note', 'is not there')
     monkeypatch.setattr(shutil, 'disk_usage', lambda _: Usage(1 << 40, 0, free))
-    _one(lambda: checks.shared_memory(tmp_path), verdict, f'{free >> 20} MB free')
+    found = _one(lambda: checks.shared_memory(tmp_path), verdict, f'{free >> 20} MB free')
+    assert ('end what fills it' in found.advice) == (verdict != 'ok')
     (tmp_path / 'fastdds_0').touch()
     few = 'note' if verdict == 'ok' else 'warning'
     assert [*findings_of([lambda: checks.shared_memory(tmp_path)])][1].verdict == few

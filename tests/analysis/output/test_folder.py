@@ -16,7 +16,13 @@ import pytest
 
 from auv_analysis.cli import main, scenario_runs
 from auv_analysis.graph import recorded_runs
-from auv_analysis.output.folder import check_free, results_folder, sha256_of, write_manifest
+from auv_analysis.output.folder import (
+    check_free,
+    has_links,
+    results_folder,
+    sha256_of,
+    write_manifest,
+)
 from auv_analysis.output.new_files import replacing, unfinished_name, write_text
 from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.files.shipped import shipped
@@ -413,3 +419,13 @@ def test_name_too_long_for_a_file_is_refused(key, project, capsys) -> None:
     assert (end.value.code, len(lines)) == (2, 1)
     assert str(path) in lines[0]
     assert not (project / 'out').exists()
+
+
+def test_a_link_anywhere_on_the_way_is_one(tmp_path: Path) -> None:
+    (tmp_path / 'real/deep').mkdir(parents=True)
+    for name in ('real/deep/file', 'link'):
+        (tmp_path / name).symlink_to(tmp_path / 'real')
+    assert [has_links(tmp_path, f'{name}/x/y') for name in ('real/deep', 'link')] == [False, True]
+    assert [has_links(tmp_path, name) for name in ('real/deep', 'real/deep/file', 'link')] == [
+        False, True, True,
+    ]  # fmt: skip

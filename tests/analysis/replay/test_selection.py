@@ -70,6 +70,11 @@ def test_outside_of_replay_commands_are_left_out(names: dict) -> None:
     assert told.left_out.keys() == DERIVED
 
 
+def test_a_command_that_nobody_sees_is_one_where_it_is_named() -> None:
+    wish = ReplaySettings(original_names=True, command_topics=('/remark',))
+    assert select(index(), wish, resolved).left_out.keys() == DERIVED | COMMANDS | {'/remark'}
+
+
 def test_there_is_one_clock_whatever_is_asked_for() -> None:
     wish = ReplaySettings(original_names=True, everything=True, commands=True)
     found = select(index(), wish, resolved)

@@ -8,7 +8,7 @@ import yaml
 from auv_analysis import load_scenario, simulate
 from auv_analysis.graph.node_parameters import node_parameters
 from auv_analysis.scenario.changes import check_paths
-from auv_analysis.scenario.fault_words import Mark, label, line_of
+from auv_analysis.scenario.fault_words import Mark, label, line_of, marks_of
 from auv_analysis.simulation.simulate import check_hold
 from auv_analysis.studies.sweep.campaign import load_campaign
 from auv_dynamics.files.errors import InputError
@@ -181,6 +181,14 @@ def test_the_controller_does_not_know_of_faults(tmp_path):
         for faults in ([], [DEAD, DELAY, WEAK])
     ]
     assert told[0]['controller_node'] == told[1]['controller_node']
+
+
+def test_faults_are_marked_where_they_begin_and_end() -> None:
+    specs = [{'kind': 'sensor_drop_out', 'from': 2.0, 'to': 3.5}, {'kind': 'sensor_bias'}]
+    found = marks_of(specs, load_scenario('case1').vehicle)
+    assert [(one.number, one.kind, one.start, one.end) for one in found] == [
+        (1, 'sensor_drop_out', 2.0, 3.5), (2, 'sensor_bias', 0.0, float('inf')),
+    ]  # fmt: skip
 
 
 def test_numbers_of_faults_at_one_time_stand_in_four_lines() -> None:

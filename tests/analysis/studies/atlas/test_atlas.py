@@ -34,6 +34,15 @@ def test_the_strongest_come_first_and_equal_inertias_share_a_panel(found) -> Non
     )
 
 
+def test_a_vehicle_that_diverges_says_why_it_has_no_peaks(monkeypatch) -> None:
+    def diverges(*_: object) -> None:
+        raise ArithmeticError('gvc diverges at 0.1 s')
+
+    monkeypatch.setattr(atlas, 'simulate', diverges)
+    reason = {'failure': 'gvc diverges at 0.1 s', 'scenario': 'case1_rexrov'}
+    assert atlas.reached('rexrov') == reason
+
+
 def test_peaks_are_those_of_the_scaled_scenario(found) -> None:
     summary = summarize(simulate(load_scenario('case1_rexrov'), 'gvc'))
     reached = next(c for c in found if c.name == 'rexrov').reached

@@ -144,6 +144,10 @@ def test_a_name_of_two_things_is_refused(folder: Path, results: Path) -> None:
     with pytest.raises(InputError, match=r'expected \./case1 for the folder, or .*case1\.yaml'):
         sources_of(['case1'])
     assert kinds('./case1') == kinds('case1/') == kinds('runs/short')
+    shutil.rmtree(folder / 'case1')
+    (folder / 'case1').write_bytes(b'')
+    with pytest.raises(InputError, match=r'expected \./case1 for the file, or .*case1\.yaml'):
+        sources_of(['case1'])
 
 
 def test_bags_and_samples_in_one_folder_are_refused(folder: Path, results: Path) -> None:

@@ -16,7 +16,7 @@ from pyarrow import parquet
 
 from auv_analysis.cli import identify as identify_command
 from auv_analysis.cli import predict as predict_command
-from auv_analysis.cli.main import main
+from auv_analysis.cli.main import main, parser
 from auv_analysis.output.folder import results_folder
 from auv_analysis.report.results import Results
 from auv_analysis.studies.identify import identify, prediction
@@ -103,6 +103,13 @@ def test_a_bag_becomes_a_vehicle_file(identified):
     page = (identified / 'report.html').read_text(encoding='utf-8')
     assert 'What was identified' in page
     assert 'residuals are white' in document['residuals']
+
+
+def test_a_bag_of_its_own_is_held_out(short, bag):
+    given = ['identify', str(short), '--vehicle', 'herman2018', '--holdout', str(bag)]
+    trial = identify_command.read(parser().parse_args(given), 'identify')
+    assert [round(one.end) for one in (*trial.training, *trial.held)] == [6, 60]
+    assert bag in trial.inputs
 
 
 @pytest.mark.usefixtures('unrendered')

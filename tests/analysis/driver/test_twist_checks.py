@@ -17,6 +17,7 @@ from auv_analysis.driver.evidence import (
     DriverRecord,
     Settings,
 )
+from auv_analysis.driver.twist_checks import _rms
 from auv_analysis.metrics.pose_twist import ANGULAR, CHILD, LINEAR, fit_readings
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.frames import swap_attitude, swap_body, swap_position, swap_state
@@ -306,3 +307,9 @@ def test_noise_of_the_depth_at_rest_is_no_false_alarm(last: float) -> None:
     heard = odometry_log(x)
     found = found_by(heard, *CHECKS)
     assert [id for id, one in found.items() if one.verdict == FAIL] == []
+
+
+def test_the_strongest_part_of_a_few_samples_is_one_of_them() -> None:
+    values = np.array([1.0, -3.0, 2.0])
+    assert _rms(values[:2], 0.0) == 3.0
+    assert _rms(np.repeat(values, 5), 5.0) == 2.0

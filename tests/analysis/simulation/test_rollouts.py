@@ -445,6 +445,7 @@ def test_what_lies_within_the_bounds_of_the_schema():
     sensed = scenario_of('gvc', sensors=NOISY)
     shares = np.array([-0.5, 0.0, 0.5, 1.0, 1.5])
     assert within(sensed, 'sensors.drop_out', shares).tolist() == [False, True, True, True, False]
+    assert within(sensed, 'sensors.velocity_noise', shares).tolist() == [False, *[True] * 4]
     assert not within(sensed, 'seed', shares).any(), 'a whole number is more than bounds'
 
 

@@ -156,7 +156,7 @@ def runs() -> Runs:
         return well and reversed_.failed == {'response_sway'} and moved and ended
 
     def stalled(runs: Runs) -> bool:
-        return any('gaps' in runs.ended[name].failed for name in ('healthy', 'reversed'))
+        return any({'gaps', 'age'} & runs.ended[name].failed for name in ('healthy', 'reversed'))
 
     return undisturbed(Runs, as_promised, stalled)
 

@@ -30,6 +30,7 @@ from helpers.node_processes import (
     start_node,
     stop,
 )
+from helpers.patience import patience
 from helpers.played_bags import STATE, STEP, ended, fill, made, steps_of, there
 from lifecycle_msgs.msg import Transition
 
@@ -352,7 +353,11 @@ def in_real_time(folder: Path) -> tuple[Path, bool]:
         use_sim_time=False,
     )
     nodes['plant_node']['start_after'] = []  # an inactive controller is not ready
-    nodes['controller_node'] |= {'autostart': False, 'limits.wrench': [3000.0] * 6}
+    nodes['plant_node'] |= {'wrench_timeout': patience(0.5)}
+    nodes['controller_node'] |= {
+        'autostart': False, 'limits.wrench': [3000.0] * 6,
+        'odometry_timeout': patience(0.5), 'setpoint_timeout': patience(0.5),
+    }  # fmt: skip
     told, attached = folder / 'params.yaml', folder / 'vehicle.yaml'
     attached.write_text(scenario.attachments['vehicle.yaml'])
     nodes['recorder_node']['attachments'] = [f'{file.name}={file}' for file in (told, attached)]

@@ -156,7 +156,8 @@ def runs() -> Runs:
         return well and reversed_.failed == {'response_sway'} and moved and ended
 
     def stalled(runs: Runs) -> bool:
-        return any({'gaps', 'age'} & runs.ended[name].failed for name in ('healthy', 'reversed'))
+        timed = {'gaps', 'age', 'response_delay'}
+        return any(timed & runs.ended[name].failed for name in ('healthy', 'reversed'))
 
     return undisturbed(Runs, as_promised, stalled)
 

@@ -180,6 +180,16 @@ def test_stamps_may_be_fractions_of_seconds_since_an_epoch(tmp_path) -> None:
     assert_array_equal(read.rows[:, 0], [1.0, 3.0])
 
 
+def test_names_of_columns_may_have_dots_and_what_is_mapped_signs_and_numbers(tmp_path) -> None:
+    path = tmp_path / 'x.csv'
+    path.write_text('t,pos.x,pos.y,v\n0,1,2,3\n1,4,5,6\n')
+    keys = {'pose': {'topic': 'x', 'fields': {'x': 'pos.x', 'y': 'pos.y'}}, 'stamp': 't',
+            'twist': {'topic': 'x', 'fields': {'v': '-v', 'w': 0.25}}}  # fmt: skip
+    read = read_sources(path, read_mapping(None, keys), [])
+    assert_array_equal(read['pose'].rows[:, :2], [[1, 2], [4, 5]])
+    assert_array_equal(read['twist'].rows[:, 1:3], [[-3, 0.25], [-6, 0.25]])
+
+
 def test_a_long_table_is_read_in_parts_and_its_lines_are_known(tmp_path) -> None:
     """Parts of numbers alone, with an empty cell and with a text."""
     path, t = tmp_path / 'x.csv', np.arange(30_000)

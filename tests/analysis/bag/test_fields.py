@@ -13,7 +13,14 @@ from helpers.made_messages import geometry, header, new, serialized
 from numpy.testing import assert_allclose
 
 from auv_analysis.bag.any_bag import decoder
-from auv_analysis.bag.foreign_fields import MessageReader, factor, presets
+from auv_analysis.bag.foreign_fields import (
+    FieldError,
+    MessageReader,
+    are_usable,
+    factor,
+    numbers,
+    presets,
+)
 from auv_analysis.bag.foreign_messages import read_sources
 from auv_analysis.bag.foreign_topics import read_mapping
 from auv_analysis.bag.foreign_tracks import tracks_of
@@ -66,6 +73,7 @@ def test_a_motion_out_of_five_topics_of_nobodys_types(kind, run, tmp_path) -> No
     notes = '\n'.join(found.notes)
     assert '/imu: every stamp is zero, so the time of logging is taken' in notes
     assert '/imu: p, q, r in deg/s, turned into rad/s' in notes
+    assert '/force: X in kN, turned into N; ' in notes
 
 
 def test_unused_bytes_behind_empty_sequences_are_not_read() -> None:
@@ -117,10 +125,31 @@ def test_a_stamped_pose_is_known_without_paths() -> None:
 @pytest.mark.parametrize('unset', [2**64 - 1, -(2**70)])
 def test_a_message_whose_time_is_none_is_left_out(unset: int) -> None:
     read = MessageReader('pose', {'z': 'z'}, {}, ('at', 'ns'))
-    one, other = (read(SimpleNamespace(at=at, z=1.0)) for at in (5, unset))
-    assert (one.stamp, one.row) == (5, (1.0,))
+    known = 2**60 + 1  # more digits than a float has
+    one, other = (read(SimpleNamespace(at=at, z=1.0)) for at in (np.uint64(known), unset))
+    assert (one.stamp, one.row) == (known, (1.0,))
     assert other.stamp == 0
     assert np.isnan(other.row).all()
+
+
+def test_a_stamp_may_be_a_time_and_a_number_the_same_in_every_message() -> None:
+    read = MessageReader('pose', {'z': 'z', 'x': 2.5}, {}, ('at', 's'))
+    found = read(SimpleNamespace(at=SimpleNamespace(sec=3, nanosec=4), z=1.5))
+    assert (found.stamp, found.row) == (3 * SECOND + 4, (2.5, 1.5))
+
+
+def test_numbers_are_those_of_a_message_itself_and_no_truth_values() -> None:
+    message = SimpleNamespace(_size=1, on=True, few=[2.0, 3.0], many=np.ones(65), text='4')
+    assert list(numbers(message)) == [('few[0]', 2.0), ('few[1]', 3.0)]
+    with pytest.raises(FieldError, match='on, which is bool'):
+        MessageReader('pose', {'z': 'on'}, {}, None)(message)
+
+
+def test_rows_of_nothing_and_of_absurd_numbers_are_of_no_use() -> None:
+    rows = np.full((3, 6), np.nan)
+    assert not are_usable(rows, 'wrench').any()
+    rows[:, 2] = -1.0, -1e200, np.inf
+    assert are_usable(rows, 'wrench').tolist() == [True, False, False]
 
 
 def test_an_imu_is_known_without_paths(run, dive, tmp_path) -> None:

@@ -9,7 +9,7 @@ import pytest
 import yaml
 from helpers.foreign_bags import SECOND, loaded, nanoseconds, simulated, write, write_chunks
 from helpers.foreign_logs import SENSORS, every, maker
-from helpers.made_messages import geometry, header, new, serialized
+from helpers.made_messages import Bag, geometry, header, new, serialized
 from numpy.testing import assert_allclose
 
 from auv_analysis.bag.any_bag import decoder
@@ -209,6 +209,18 @@ def test_thrusts_of_several_topics_in_their_order(run, tmp_path) -> None:
     assert_allclose(np.diff(tracks['wrench'].ns), SECOND / 200, atol=2000)
     found = loaded(write(tmp_path / 'dive', messages, make), written(keys, tmp_path))
     assert_allclose(found.tau, u @ vehicle.thrusters.matrix.T, rtol=1e-12, atol=1e-12)
+
+
+def test_a_message_without_stamp_may_be_logged_at_any_time(tmp_path) -> None:
+    kind, bag, notes = 'geometry_msgs/msg/Wrench', Bag(tmp_path / 'x.mcap'), list[str]()
+    for k, ns in enumerate((5, 2**64 - 1)):
+        force, torque = (geometry('Vector3', k, 10 * k, i) for i in (1, 2))
+        bag.add('/tau', kind, ns, serialized(geometry('Wrench', force, torque)))
+    keys = {'twist': {'topic': '/tau', 'fields': {'u': 'force.y'}}, 'wrench': '/tau'}
+    found = read_sources(bag.close(), read_mapping(None, keys), notes)
+    assert found['twist'].stamps.tolist() == [5, 2**62]
+    assert found['wrench'].rows.tolist() == [[0, 0, 1, 0, 0, 2], [1, 10, 1, 1, 10, 2]]
+    assert notes == ['/tau: messages without stamp, so the time of logging is taken'] * 2
 
 
 DVL = SENSORS['twist'][0]

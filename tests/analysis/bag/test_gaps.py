@@ -2,6 +2,7 @@
 
 import io
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from auv_analysis.bag.reading import usual_limit
 from auv_analysis.bag.tracks import (
     Track,
     at_times,
+    between_gaps,
     integral,
     means_over,
     sensible_step,
@@ -213,6 +215,27 @@ def test_base_has_equal_steps_through_gaps() -> None:
     assert base.spans() == ((pytest.approx(2.6), pytest.approx(5.2)),)
     assert base.t[-1] == pytest.approx(7.2)
     assert_array_equal(np.unique(base.owner), [0, 1])
+
+
+def test_a_stretch_is_of_use_from_twelve_velocities_on() -> None:
+    for count, left in ((12, 0), (11, 1)):
+        one = track(np.arange(count) / 10.0)
+        base = time_base([one, track([0.0, 1.1], gap=2.0)], one, NANOSECONDS // 10)
+        assert (len(base.ns), base.left_out) == (count if not left else 0, left)
+
+
+def test_a_pause_is_tolerated_where_nobody_told_its_limit() -> None:
+    one = track([0.0, 1.0, 5.0], gap=2.0)
+    both = replace(one, parts=(one, replace(one, told=True)))
+    found = both.tolerant(4.0 * NANOSECONDS)
+    assert [part.limit / NANOSECONDS for part in found.parts] == [4.0, 2.0]
+    assert (len(both.gaps()), found.gaps().tolist()) == (2, [[NANOSECONDS, 5 * NANOSECONDS]])
+
+
+def test_a_gap_within_another_one_ends_before_it() -> None:
+    wide, inside = track([0, 1, 10, 11], gap=2.0), track([0, 1, 2, 6, 7, 8, 9, 10, 11], gap=2.0)
+    found = between_gaps(0, 11 * NANOSECONDS, [inside, wide])
+    assert (np.array(found) / NANOSECONDS).tolist() == [[0, 1], [10, 11]]
 
 
 def test_integrals_and_means_of_what_is_held_and_of_lines() -> None:

@@ -1,6 +1,6 @@
 """Bags that look like those of other systems: their topics, types, axes, clocks and containers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,6 @@ import yaml
 from helpers.foreign_bags import (
     Maker,
     Message,
-    Motion,
     loaded,
     motion,
     nanoseconds,
@@ -23,6 +22,7 @@ from helpers.foreign_bags import (
 from numpy.testing import assert_allclose
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
+from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.load import load_run
 from auv_analysis.replay.played_bag import index_bag
 from auv_analysis.replay.played_bag import messages as played_messages
@@ -171,6 +171,7 @@ def test_files_of_a_killed_recorder_are_read_by_their_numbers(run, tmp_path) -> 
         next(part.glob('*.db3')).rename(bag / f'killed_{number}.db3')
     found = loaded(bag, odometry='/o', wrench='/w', frames='ned_fsd', step=0.01)
     assert found.samples == 3 * run.samples
+    assert survey(bag).counts == dict.fromkeys(topics, 3 * run.samples)
     assert not any('jumps back' in note for note in found.notes)
 
 
@@ -201,11 +202,12 @@ def test_messages_that_were_compressed_one_by_one(run, tmp_path) -> None:
 def test_mcap_of_ros_1(run, tmp_path) -> None:
     maker = Maker(ros1=True)
     messages, keys = mavros(run, maker)
-    found = loaded(write_chunks(tmp_path / 'one.mcap', messages, maker), **keys, step=0.01)
+    found = loaded(write_chunks(tmp_path / 'dive 1.mcap', messages, maker), **keys, step=0.01)
     assert_allclose(found.nu, run.nu, atol=1e-7)
+    assert found.scenario == 'dive_1'
 
 
-def numbers_on_a_topic(run: Run, numbers: np.ndarray, name: str = 'Float64MultiArray'):
+def numbers_on_a_topic(run: Run, numbers: Iterable[np.ndarray], name: str = 'Float64MultiArray'):
     """Odometry of a run on /o, and an array on /thrusts."""
     maker, m = Maker(), motion(run, enu=False)
     messages = [
@@ -239,11 +241,24 @@ def test_thrusts_become_the_wrench_of_the_vehicle_file(name, run, tmp_path) -> N
         loaded(bag, **keys)
 
 
+@pytest.mark.parametrize(('last', 'line'), [
+    (5, r'/thrusts: expected 8 numbers, one per thruster of bluerov2_heavy, found 5$'),
+    (4, r'/thrusts: expected 5 numbers in each message, found 4$'),
+])  # fmt: skip
+def test_thrusts_of_another_number_are_refused(last, line, run, tmp_path) -> None:
+    part = run.part(slice(3))
+    numbers = [np.ones(5), np.ones(5), np.ones(last)]
+    bag = write(tmp_path / 'other', *numbers_on_a_topic(part, numbers))
+    with pytest.raises(InputError, match=line):
+        loaded(bag, odometry='/o', thrusters='/thrusts', vehicle='bluerov2_heavy')
+
+
 def test_pulse_widths_become_a_wrench_by_a_curve(run, tmp_path) -> None:
     vehicle, curve = load_vehicle('bluerov2_heavy'), load_curve('t200_16v')
     assert vehicle.thrusters is not None
     mirrored = np.isin(np.arange(8), [2, 4])
     u = np.random.default_rng(0).uniform(-30.0, 30.0, (run.samples, 8))
+    u[:20, 0], u[:4, 1], u[4:10, 1] = 0.0, curve.thrusts[0], curve.thrusts[-1]
     bag = write(tmp_path / 'other', *numbers_on_a_topic(run, curve.command(u, mirrored)))
 
     def read(**entry: Any) -> Run:
@@ -252,7 +267,8 @@ def test_pulse_widths_become_a_wrench_by_a_curve(run, tmp_path) -> None:
 
     found = read()
     assert_allclose(found.tau, u @ vehicle.thrusters.matrix.T, atol=1e-9)
-    assert any('pwm_us into N by t200_16v, a steady curve' in note for note in found.notes)
+    (note,) = (note for note in found.notes if 'pwm_us into N by t200_16v, a steady curve' in note)
+    assert '2.48 % of the commands without thrust, 1.24 % at its ends' in note
     wrong = read(reversed=[]).tau - found.tau
     assert np.abs(wrong).max() > 10.0
     for entry, expected in (
@@ -303,14 +319,18 @@ def test_a_doubtful_twist_frame_is_said(run, tmp_path) -> None:
 
 
 def test_a_position_above_the_water_is_said(run, tmp_path) -> None:
-    maker = Maker()
-    m = motion(run, enu=True)
-    low = Motion(m.t, m.position - [0.0, 0.0, 20.0], *m[2:])
-    bag = write(tmp_path / 'other', simple(low, maker, '/o', '/w', ('map', 'base')), maker)
-    keys = {'odometry': '/o', 'wrench': '/w'}
-    told = {frames: loaded(bag, **keys, frames=frames) for frames in ('ned_fsd', 'enu_flu')}
-    said = {frames: any('above its origin' in n for n in r.notes) for frames, r in told.items()}
-    assert said == {'ned_fsd': True, 'enu_flu': False}
+    maker, m = Maker(), motion(run, enu=True)
+    up = m.position[:, 2]
+    high = f'is {20.0 - up.max():.3g} to {20.0 - up.min():.3g} m above its origin'
+    for frames, shift, said in (
+        ('ned_fsd', 20.0, [high]), ('enu_flu', 20.0, []), ('ned_fsd', up.mean(), []),
+    ):  # fmt: skip
+        moved = m._replace(position=m.position - [0.0, 0.0, shift])
+        bag = tmp_path / f'{frames}{shift:.0f}'
+        write(bag, simple(moved, maker, '/o', '/w', ('map', 'base')), maker)
+        notes = loaded(bag, odometry='/o', wrench='/w', frames=frames).notes
+        assert [high for note in notes if high in note] == said
+        assert sum('above its origin' in note for note in notes) == len(said)
 
 
 def test_the_name_is_that_of_the_bag_or_the_one_given(run, tmp_path) -> None:

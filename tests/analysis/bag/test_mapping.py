@@ -63,6 +63,13 @@ def test_what_a_topic_does_not_say_the_file_says(tmp_path) -> None:
     assert (odometry.between, wrench.between) == ('linear', 'linear')
 
 
+def test_what_an_entry_leaves_out_is_unknown_or_usual() -> None:
+    told = {'topic': '/o', 'fields': {'phi': 'a', 'theta': 'b', 'u': 'c'}, 'stamp': {'field': 't'}}
+    found = read_mapping(None, {'odometry': told, 'wrench': '/w', 'unknown': ['x']})
+    assert found.unknown == {'psi', 'x'}
+    assert found.sources['odometry'].stamp == ('t', 's')
+
+
 def test_options_replace_keys(tmp_path) -> None:
     path = tmp_path / 'map.yaml'
     path.write_text(f'{GOOD}step: 0.1\nvehicle: rexrov\n')

@@ -24,9 +24,15 @@ from numpy.testing import assert_allclose
 from rosbags.typesys import get_types_from_msg
 
 from auv_analysis.bag.any_bag import survey
-from auv_analysis.bag.foreign_topics import candidates, read_mapping
+from auv_analysis.bag.foreign_topics import (
+    candidates,
+    other_odometries,
+    read_mapping,
+    with_candidates,
+)
 from auv_analysis.bag.proposal import component_of, looked_through, proposal
 from auv_analysis.bag.reading import BagContents
+from auv_analysis.bag.step_topics import NotOursError
 from auv_analysis.cli import main
 from auv_analysis.runs.run import Run
 
@@ -152,16 +158,38 @@ def test_what_is_missing_is_a_comment(tmp_path) -> None:
 def test_candidates_are_those_with_messages_the_likeliest_first() -> None:
     topics = {
         '/a/odom': ('nav_msgs/msg/Odometry', 5), '/b/odom': ('nav_msgs/msg/Odometry', 50),
-        '/c/odom': ('nav_msgs/msg/Odometry', 0), '/cmd_vel': ('geometry_msgs/msg/Twist', 9),
+        '/c/odom': ('nav_msgs/msg/Odometry', 0), '/ref/odom': ('nav_msgs/msg/Odometry', 2),
+        '/cmd_vel': ('geometry_msgs/msg/Twist', 9),
         '/dvl': ('geometry_msgs/msg/TwistStamped', 7), '/tau': ('geometry_msgs/msg/Wrench', 9),
+        '/a/tau': ('geometry_msgs/msg/Wrench', 9),
     }  # fmt: skip
     kinds = {topic: kind for topic, (kind, _) in topics.items()}
     contents = BagContents(types=kinds, counts={topic: n for topic, (_, n) in topics.items()})
     found = {role: names for role, names in candidates(contents).items() if names}
     assert found == {
-        'odometry': ['/b/odom', '/a/odom'], 'twist': ['/dvl'], 'wrench': ['/tau'],
-        'setpoint': ['/cmd_vel'],
+        'odometry': ['/b/odom', '/a/odom', '/ref/odom'], 'twist': ['/dvl'],
+        'wrench': ['/a/tau', '/tau'], 'setpoint': ['/cmd_vel'],
     }  # fmt: skip
+    others = {'/a/odom': kinds['/a/odom'], '/sim/ground_truth/odom': kinds['/a/odom']}
+    assert other_odometries(kinds | others, '/a/odom').endswith(
+        '--odom /b/odom or /c/odom or /ref/odom'
+    )
+
+
+@pytest.mark.parametrize(('kinds', 'options'), [
+    ({'/p': 'geometry_msgs/msg/PoseStamped', '/v': 'geometry_msgs/msg/TwistStamped',
+      '/rov/pwm': 'std_msgs/msg/Float64MultiArray'},
+     '--map FILE with pose /p and twist /v, --map FILE with thrusters /rov/pwm, {}'),
+    ({'/cmd_vel': 'geometry_msgs/msg/Twist'},
+     '--setpoint /cmd_vel, {} (the bag has no odometry and no wrench)'),
+])  # fmt: skip
+def test_a_refusal_names_the_options_that_would_map_the_topics(kinds, options, tmp_path) -> None:
+    bag = Bag(tmp_path / 'dive.mcap')
+    for topic, kind in kinds.items():
+        bag.add(topic, kind, 0, bytes(12))
+    found = with_candidates(NotOursError(bag.close(), 'odom', 'messages', None))
+    more = options.format('--frames ned_fsd or enu_flu, --vehicle FILE')
+    assert found.expected == f'messages, or of another system {more}'
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,14 @@ from helpers.foreign_bags import (
 )
 from numpy.testing import assert_allclose, assert_array_equal
 
-from auv_analysis.bag.foreign_messages import Recorded, longest_stretch, on_the_clock, ordered
-from auv_analysis.bag.foreign_topics import MappedTopic
+from auv_analysis.bag.foreign_messages import (
+    Recorded,
+    longest_stretch,
+    on_the_clock,
+    ordered,
+    read_sources,
+)
+from auv_analysis.bag.foreign_topics import MappedTopic, read_mapping
 from auv_analysis.bag.foreign_tracks import _on_one_clock, _retimed, _track
 from auv_analysis.runs.run import Run
 from auv_dynamics.files.errors import InputError
@@ -101,6 +107,9 @@ def test_logged_times_are_put_on_another_clock() -> None:
     found = on_the_clock(logged, clock, notes)
     assert_allclose(found.stamps / SECOND, [-1.0, 0.5, 2.0, 6.0])
     assert 'logged 102 s off the stamps of /twist' in notes[0]
+    ahead = recorded(900 * SECOND + clock.stamps, log=clock.log).part(np.array([2, 0, 1, 4, 3]))
+    found = on_the_clock(logged, ahead, notes)  # whatever order it was logged in
+    assert_allclose(found.stamps / SECOND, [899.0, 900.5, 902.0, 906.0])
     near = recorded(np.arange(5) * SECOND, log=np.arange(5) * SECOND + SECOND // 10)
     assert on_the_clock(logged, near, []) is logged, 'one clock and a delay'
 
@@ -108,10 +117,12 @@ def test_logged_times_are_put_on_another_clock() -> None:
 def test_logged_times_follow_the_stretch_of_the_clock_that_is_read() -> None:
     seconds = np.array([*range(6), *range(9)])
     log = (100 + np.arange(15)) * SECOND
-    clock = recorded(seconds * SECOND, log=log)
-    found = _on_one_clock({'twist': clock, 'wrench': recorded(log, 'wrench', stamped=False)}, [])
-    assert_array_equal(found['wrench'].stamps, np.arange(9) * SECOND)
-    assert_array_equal(found['wrench'].rows[:, 0], np.arange(6, 15))
+    clock = recorded(seconds * SECOND, 'odometry', log)
+    others = {role: recorded(log, role, stamped=False) for role in ('twist', 'wrench')}
+    found = _on_one_clock({**others, 'odometry': clock}, [])
+    for role in others:
+        assert_array_equal(found[role].stamps, np.arange(9) * SECOND)
+        assert_array_equal(found[role].rows[:, 0], np.arange(6, 15))
 
 
 def test_no_line_leads_from_a_single_message() -> None:
@@ -203,7 +214,37 @@ def test_topics_that_never_meet_are_refused(run, tmp_path) -> None:
         loaded(bag, **KEYS)
 
 
+def test_velocities_of_a_time_without_wrench_are_counted(run, tmp_path) -> None:
+    seen, forces = motion(run, enu=True), motion(run, enu=True, keep=slice(20, 71))
+    listed = simple(seen, Maker(), '/o', '/w', UNNAMED, forces)
+    notes = loaded(write(tmp_path / 'other', listed, Maker()), **KEYS).notes
+    assert any('velocities of 0.2 s before and 0.3 s behind the samples' in n for n in notes)
+
+
+def read(listed: list, folder: Path, notes: list[str]) -> dict[str, Recorded]:
+    mapping = read_mapping(None, {'odometry': '/o', 'wrench': '/w'})
+    return read_sources(write(folder, listed, Maker()), mapping, notes)
+
+
+def test_a_topic_of_two_frames_is_refused(run, tmp_path) -> None:
+    listed = messages(run.part(slice(3)))
+    listed[1][2].header.frame_id = 'map'
+    line = '/o: expected the same frame_id in all messages, found map base_link; odom base_link'
+    with pytest.raises(InputError, match=line):
+        read(listed, tmp_path / 'other', [])
+
+
+def test_an_odometry_of_zeros_is_said_and_one_that_stands_still_is_none(run, tmp_path) -> None:
+    m = motion(run.part(slice(3)), enu=True)
+    for share, said in ((0.0, 1), (0.5, 0)):
+        still = m._replace(twist=0.0 * m.twist, position=share * m.position)
+        notes: list[str] = []
+        read(simple(still, Maker(), '/o', '/w', UNNAMED), tmp_path / f'{said}', notes)
+        assert sum('/o: position and velocity are zero' in note for note in notes) == said
+
+
 @pytest.mark.parametrize(('keys', 'line'), [
+    ({'odometry': {'topic': '/o', 'stamp': 'at'}}, r'odometry.stamp: expected a path in its mess'),
     ({'odometry': '/x'}, r'odometry: expected a topic of the bag: /o, found /x'),
     ({'odometry': '/w'}, r'/w: expected nav_msgs/msg/Odometry, found geometry_msgs/msg/WrenchStam'),
     ({'wrench': '/o'}, r'/o: expected geometry_msgs/msg/WrenchStamped or geometry_msgs/msg/Wr'),

@@ -13,7 +13,7 @@ from helpers.foreign_bags import (
 )
 
 from auv_analysis.bag.any_bag import survey
-from auv_analysis.bag.metadata import Definition, files_of, is_mcap
+from auv_analysis.bag.metadata import Definition, files_of, is_csv, is_mcap
 from auv_analysis.bag.output import Storage
 from auv_analysis.bag.writer import BagWriter
 from auv_analysis.runs.run import Run
@@ -59,6 +59,24 @@ def test_what_is_no_bag_is_refused(name, data, tmp_path) -> None:
     with pytest.raises(InputError) as refusal:
         loaded(path, **KEYS)
     assert str(path) in str(refusal.value)
+
+
+@pytest.mark.parametrize(('name', 'is_ours'), [
+    ('x.mcap', True), ('x.db3', False), ('x_0.db3.zstd', False),
+])  # fmt: skip
+def test_a_table_beside_a_bag_is_no_bag(name, is_ours, tmp_path) -> None:
+    for one in (name, 'dive.csv'):
+        (tmp_path / one).write_bytes(b'')
+    assert (is_csv(tmp_path), is_mcap(tmp_path)) == (False, is_ours)
+
+
+def test_a_link_among_the_files_of_a_killed_recorder_is_refused(tmp_path) -> None:
+    bag = tmp_path / 'bag'
+    bag.mkdir()
+    (tmp_path / 'secret.db3').write_bytes(b'')
+    (bag / 'x_0.db3').symlink_to(tmp_path / 'secret.db3')
+    with pytest.raises(InputError, match='a link to'):
+        survey(bag)
 
 
 def test_no_bag_is_refused(tmp_path) -> None:

@@ -220,6 +220,7 @@ def test_without_the_note_they_are_not_guessed(tmp_path: Path) -> None:
         ('topics: 3', 'topics: expected a mapping of topics to names, found 3'),
         ('topics: {/a: [1]}', 'topics: expected a mapping of topics to names'),
         ('topics: {/a: /odom, /b: /odom}', 'topics: expected each name once'),
+        ('namespace: 3', 'namespace: expected the name of a namespace, found 3'),
     ],
 )
 def test_a_note_that_is_none_is_refused(tmp_path: Path, text: str, said: str) -> None:

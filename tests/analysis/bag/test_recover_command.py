@@ -12,6 +12,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 from helpers.damaged_bags import (
@@ -24,11 +25,12 @@ from helpers.damaged_bags import (
     seen_by_rosbags,
     write_bag,
 )
-from mcap.records import Chunk, Message
+from mcap.records import Channel, Chunk, Message
 from mcap.stream_reader import breakup_chunk
 
 from auv_analysis.bag import recover as recovery
-from auv_analysis.bag.metadata import Definition
+from auv_analysis.bag.inspection import Definitions, Spacing
+from auv_analysis.bag.metadata import Definition, FileExtent, metadata
 from auv_analysis.bag.output import Storage
 from auv_analysis.bag.reading import read_bag
 from auv_analysis.bag.recover import recover
@@ -201,6 +203,53 @@ def test_what_only_a_metadata_yaml_says_is_kept(tmp_path: Path) -> None:
     found = yaml.safe_load(path.read_text())['rosbag2_bagfile_information']
     assert (found['ros_distro'], found['custom_data']) == ('humble', {'dive': '7'})
     assert found['message_count'] == 65
+
+
+def test_a_metadata_yaml_agrees_by_files_counts_and_span() -> None:
+    topics = [Definition('/a', 'x'), Definition('/none', 'x')]
+    told = metadata(topics, [FileExtent('a.mcap', {'/a': 2}, 5, 9)])
+    agrees = recovery._gist(told)
+    assert recovery._gist(metadata(topics[:1], [FileExtent('a.mcap', {'/a': 2}, 5, 9)])) == agrees
+    for name, counts, first, last in (
+        ('b.mcap', {'/a': 2}, 5, 9), ('a.mcap', {'/a': 3}, 5, 9), ('a.mcap', {'/b': 2}, 5, 9),
+        ('a.mcap', {'/a': 2}, 4, 8), ('a.mcap', {'/a': 2}, 5, 8),
+    ):  # fmt: skip
+        other = metadata([*topics, Definition('/b', 'x')], [FileExtent(name, counts, first, last)])
+        assert recovery._gist(other) != agrees
+
+
+def test_gaps_over_several_files_are_those_of_one() -> None:
+    wide = [38 + k for k in range(12)]  # ms, beside 10; one message comes 3 ms late
+    apart = [10] * 20 + [n for gap in wide for n in (gap, 10)] + [10, 13, -3, 10]
+    stamps = np.cumsum([5000, *apart]) * 1_000_000
+    whole, joined, part = Spacing(), Spacing(), Spacing()
+    whole.add(stamps)
+    cut = 25  # within a gap
+    part.add(stamps[:7])
+    part.add(stamps[7:cut])
+    later = Spacing()
+    later.add(stamps[cut:])
+    for one in (Spacing(), part, later):
+        joined.join(one)
+    found = whole.gaps()
+    assert apart[cut - 1] in wide
+    assert vars(joined) | {'longest': sorted(joined.longest)} == vars(whole) | {
+        'longest': sorted(whole.longest)
+    }
+    assert (whole.count, whole.first, whole.last) == (len(stamps), stamps[0], stamps[-1])
+    assert (found['gaps'], found['missing']) == (12, sum(round(n / 10) - 1 for n in wide))
+    begin = 5.2 + (sum(wide[:2]) + 20) / 1e3
+    assert len(found['longest']) == 10
+    assert found['longest'][0] == pytest.approx([begin, begin + 0.04])
+
+
+def test_a_definition_is_that_which_is_checked_best() -> None:
+    one, other = (Channel(1, topic, 'cdr', {}, 0) for topic in ('/a', '/b'))
+    known = Definitions()
+    for channel, trust, kept in ((one, 0, one), (other, 2, other), (one, 1, other)):
+        known.add(channel, trust)
+        assert known.channel(1) is kept
+    assert known.doubtful == {'/a', '/b'}
 
 
 @pytest.mark.parametrize(

@@ -237,8 +237,7 @@ def _velocity(one: Recorded, axes: str, pose: Track, frame: str) -> Track:
     halves = [one.rows[:, :3], one.rows[:, 3:]]
     if axes == ENU_FLU:
         halves = [swap_position(half) for half in halves]
-    inside = np.clip(one.stamps, pose.ns[0], pose.ns[-1])
-    to_body = at_times(pose, inside)[:, 3:] * CONJUGATE
+    to_body = at_times(pose, one.stamps)[:, 3:] * CONJUGATE
     rows = np.concatenate([turn(to_body, half) for half in halves], axis=1)
     return _track('twist', one, axes, rows)
 

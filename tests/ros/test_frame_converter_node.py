@@ -86,6 +86,8 @@ def run(*, mirrored: bool) -> dict[str, np.ndarray]:
         names = ('plant/odom', 'plant/wrench') if mirrored else ('odom', 'wrench')
         kinds = (topics.ODOM, topics.WRENCH)
         heard = [Topic(n, k.type) for n, k in zip(names, kinds, strict=True)]
+        if mirrored:  # before we hear its wrench as well: it has met the plant
+            peer.until(lambda: peer.call(Trigger, 'mirror/ready').success, 'the mirror')
         peer.listen(*{topic.name: topic for topic in (*heard, *kinds)}.values())
         if mirrored:
             peer.call(GetParameters, 'mirror/get_parameters')  # who answers knows what we hear

@@ -143,6 +143,12 @@ class _Dumper(yaml.SafeDumper):
         return True
 
 
+def counts_in(document: Mapping[str, Any]) -> dict[str, int]:
+    """Topic -> number of its messages, of those that have any, as the metadata of a bag say."""
+    every = document['topics_with_message_count']
+    return {e['topic_metadata']['name']: e['message_count'] for e in every if e['message_count']}
+
+
 def as_text(document: Mapping[str, Any]) -> str:
     """Text of a metadata.yaml."""
     return yaml.dump({ROOT: document}, Dumper=_Dumper, sort_keys=False)

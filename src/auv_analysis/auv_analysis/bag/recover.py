@@ -24,6 +24,7 @@ from auv_analysis.bag.metadata import (
     Definition,
     as_text,
     check_regular,
+    counts_in,
     metadata,
     split_order,
     write_metadata,
@@ -259,11 +260,7 @@ def _gist(document: dict[str, Any]) -> Any:
     return (
         [*document['relative_file_paths']],
         document['message_count'],
-        {
-            entry['topic_metadata']['name']: entry['message_count']
-            for entry in document['topics_with_message_count']
-            if entry['message_count']
-        },
+        counts_in(document),
         document['message_count'] and document['starting_time']['nanoseconds_since_epoch'],
         document['duration']['nanoseconds'],
     )

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from auv_analysis.bag.metadata import METADATA, ROOT
+from auv_analysis.bag.metadata import METADATA, ROOT, counts_in
 from auv_analysis.graph.node_parameters import (
     ANALYSIS,
     CONTROLLER,
@@ -177,6 +177,4 @@ def _follow(
 
 def _last_step(bag: Path) -> int:
     """Number of the last step whose wrench is in a closed bag; -1: of none."""
-    told = read_yaml(bag / METADATA, 'metadata')[ROOT]['topics_with_message_count']
-    counts = {one['topic_metadata']['name']: one['message_count'] for one in told}
-    return int(counts.get(f'/{WRENCH}', 0)) - 1
+    return counts_in(read_yaml(bag / METADATA, 'metadata')[ROOT]).get(f'/{WRENCH}', 0) - 1

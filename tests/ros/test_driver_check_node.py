@@ -32,7 +32,7 @@ from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
 
 SECONDS = 3.0  # of listening
-SLOW = 2.4  # Hz: it publishes two a second, fewer where the machine stands still
+SLOW = 1.2 * faulty_drivers.SLOW  # Hz: it is slower where the machine stands still, not faster
 TOPICS = {interface.ODOM: interface.ODOM, interface.WRENCH: interface.WRENCH}
 # a machine that is busy with other tests may keep all of them waiting
 PATIENT = Settings(timeout=patience(4.0), gap=patience(4.0))

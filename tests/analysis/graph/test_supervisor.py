@@ -41,12 +41,16 @@ def test_who_ends_is_named_with_its_last_words_and_what_the_others_complain_of(
     assert str(caught.value).splitlines() == ['node ended with exit code 3', *told]
 
 
-@pytest.mark.parametrize(('writes', 'code'), [('recorder', 7), ('', -signal.SIGKILL)])
-def test_who_writes_has_more_time_to_end(tmp_path: Path, monkeypatch, capsys, writes, code) -> None:
+@pytest.mark.parametrize(
+    ('writes', 'takes', 'code'), [('recorder', 0.5, 7), ('', 600, -signal.SIGKILL)]
+)
+def test_who_writes_has_more_time_to_end(
+    tmp_path: Path, monkeypatch, capsys, writes: str, takes: float, code: int
+) -> None:
     monkeypatch.setattr(supervisor, 'GRACE', 0.01)
     group = supervisor.Supervisor(tmp_path, os.environ)
     begin = f'import signal, sys, time; from pathlib import Path; ready = Path({str(tmp_path)!r})'
-    ends = 'signal.signal(signal.SIGTERM, lambda *_: (time.sleep(0.5), sys.exit(7)))'
+    ends = f'signal.signal(signal.SIGTERM, lambda *_: (time.sleep({takes}), sys.exit(7)))'
     ready = '(ready / "ready").touch(); time.sleep(600)'
     group.start('recorder', [sys.executable, '-c', f'{begin}; {ends}; {ready}'])
     group.start('node', ['sleep', '600'])

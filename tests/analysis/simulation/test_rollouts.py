@@ -415,6 +415,14 @@ def test_a_value_that_a_file_may_not_have_is_refused(changes, base, key):
     assert columns['reason'][0] in str(refused.value)
 
 
+def test_a_row_without_the_controller_that_is_asked_for_is_refused():
+    scenario = scenario_of('gvc', duration=0.1)
+    others = [{'cl': {'law': 'cl', **LAWS['cl']}}, scenario.data['controllers']]
+    columns = rollouts(scenario, 'gvc', {'controllers': others})
+    assert columns['status'].tolist() == ['refused', 'ok']
+    assert 'gvc' in columns['reason'][0]
+
+
 def test_gains_that_a_law_refuses_are_known_row_by_row():
     pid = {'law': 'pid', **LAWS['pid'], 'omega_f': 20.0}
     scenario = scenario_of('pid', controllers={'pid': pid, 'other': pid})

@@ -187,7 +187,9 @@ def test_the_first_of_several_errors_is_what_explains_the_others(data: dict, sai
     with pytest.raises(InputError, match=said):
         validate(data, THREE, 'f')
     validate({'a': 1e100}, THREE, 'f')
-    nested = THREE | {'properties': {'a': NUMBER, 'c': THREE}}
+    nested = THREE | {'properties': {'c': THREE, 'a': NUMBER}}
+    with pytest.raises(InputError, match='c: expected a file'):
+        validate({'a': 'x', 'c': 1}, nested, 'f')
     with pytest.raises(InputError, match=r'c\.d: expected one of a, b, c'):
         validate({'a': 'x', 'c': {'a': 1, 'd': 1}}, nested, 'f')
 

@@ -248,7 +248,7 @@ def _settle_metadata(folder: Path, report: Report) -> str:
             return 'unchanged'
     except (InputError, LookupError, TypeError, AttributeError):
         told = {}
-    for key in ('custom_data', 'ros_distro'):
+    for key in ('custom_data', 'ros_distro', 'compression_format', 'compression_mode'):
         if isinstance(told, dict) and told.get(key):
             document[key] = told[key]
     write_metadata(folder, as_text(document))

@@ -152,6 +152,7 @@ def _of_scenario(
     """Rollouts that share all values but those in columns."""
     try:
         base = changed_scenario(scenario, values) if values else scenario
+        base.controller(controller)
         fitting = {p for p, v in together.items() if in_columns(base, controller, p, v[rows])}
     except InputError as error:
         reasons[rows] = _reason(error)

@@ -246,15 +246,11 @@ def validate(data: dict[str, Any], root: dict[str, Any], file: object) -> None:
 
     _check_finite(data, file)
     validator = jsonschema.Draft202012Validator(root)
-    errors = sorted(validator.iter_errors(data), key=_rank)
+    # unknown keys first (a misspelt key also leaves a missing one), else in the schema's order
+    order = {'additionalProperties': 0, 'unevaluatedProperties': 0, 'required': 2}
+    errors = sorted(validator.iter_errors(data), key=lambda error: order.get(error.validator, 1))
     if errors:
         raise _as_input_error(errors[0], root, file)
-
-
-def _rank(error: 'jsonschema.ValidationError') -> tuple[Any, ...]:
-    # unknown keys first (a misspelt key also leaves a missing one), then in file order
-    order = {'additionalProperties': 0, 'unevaluatedProperties': 0, 'required': 2}
-    return order.get(error.validator, 1), [str(part) for part in error.absolute_path]
 
 
 def dotted(path: Any) -> str:

@@ -62,7 +62,7 @@ def test_what_is_no_bag_is_refused(name, data, tmp_path) -> None:
 
 
 @pytest.mark.parametrize(('name', 'is_ours'), [
-    ('x.mcap', True), ('x.db3', False), ('x_0.db3.zstd', False),
+    ('x.mcap', True), ('x.db3', False), ('x_0.db3.zstd', False), ('x_0.mcap.zstd', False),
 ])  # fmt: skip
 def test_a_table_beside_a_bag_is_no_bag(name, is_ours, tmp_path) -> None:
     for one in (name, 'dive.csv'):

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+import zstandard
 from helpers.foreign_bags import (
     Maker,
     Message,
@@ -183,6 +184,22 @@ def test_an_mcap_that_was_not_finished_is_read_as_far_as_it_goes(run, tmp_path) 
     found = loaded(file, **keys)
     assert 'was not finished' in found.notes[0]
     assert 1 < found.samples < run.samples
+
+
+@pytest.mark.parametrize('plugin', StoragePlugin)
+def test_files_that_were_compressed_as_a_whole(plugin, run, tmp_path) -> None:
+    messages, keys = cola2(run, Maker())
+    bag, maker = tmp_path / 'bag', Maker()
+    writer = Writer(bag, version=9, storage_plugin=plugin)
+    writer.set_compression(CompressionMode.FILE, CompressionFormat.ZSTD)
+    written(bag, writer, messages, maker.store.serialize_cdr, maker)
+    (file,) = bag.glob('*.zstd')
+    data = zstandard.ZstdDecompressor().decompressobj().decompress(file.read_bytes())
+    file.write_bytes(zstandard.ZstdCompressor().compress(data))  # rosbag2 says the size in front
+    assert_allclose(loaded(bag, **keys).nu, run.nu, atol=1e-7)
+    (bag / 'metadata.yaml').unlink()
+    with pytest.raises(InputError, match=r'expected a metadata\.yaml beside compressed files'):
+        survey(bag)
 
 
 def test_messages_that_were_compressed_one_by_one(run, tmp_path) -> None:

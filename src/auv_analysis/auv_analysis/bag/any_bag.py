@@ -186,6 +186,8 @@ def _parts(bag: Path) -> list[Path]:
         _check_metadata(bag)
         return [bag]
     files = sorted(bag.glob('*.db3'), key=split_order)
+    if not files:
+        raise InputError(bag, '', 'a metadata.yaml beside compressed files', 'none')
     for file in files:
         check_regular(file, bag)
     return files

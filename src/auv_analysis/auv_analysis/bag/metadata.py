@@ -185,7 +185,7 @@ def is_mcap(bag: Path) -> bool:
     if os.path.isdir(bag):
         if any(bag.glob('*.mcap')):
             return True
-        if not any(bag.glob('*.db3*')):
+        if not [*bag.glob('*.db3*'), *bag.glob('*.mcap.zstd')]:
             raise InputError(bag, '', BAG, 'a folder with neither .mcap nor .db3 files')
         return False
     if not os.path.isfile(bag):

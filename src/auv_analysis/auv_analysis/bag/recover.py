@@ -248,8 +248,11 @@ def _settle_metadata(folder: Path, report: Report) -> str:
             return 'unchanged'
     except (InputError, LookupError, TypeError, AttributeError):
         told = {}
-    for key in ('custom_data', 'ros_distro', 'compression_format', 'compression_mode'):
-        if isinstance(told, dict) and told.get(key):
+    told = told if isinstance(told, dict) else {}
+    packed = str(told.get('compression_mode', '')).lower() == 'message'  # files are not, any more
+    kept = ['compression_format', 'compression_mode'] if packed else []
+    for key in (*kept, 'custom_data', 'ros_distro'):
+        if told.get(key):
             document[key] = told[key]
     write_metadata(folder, as_text(document))
     return 'written'

@@ -22,7 +22,7 @@ from auv_analysis.studies.identify.identify import (
     identify,
     split,
 )
-from auv_analysis.studies.identify.output_error import OutputError
+from auv_analysis.studies.identify.output_error import Normal, OutputError
 from auv_analysis.studies.identify.plausibility import (
     _scale,
     _useless,
@@ -274,6 +274,18 @@ def test_normal_equations_of_a_longer_recording_take_no_more_memory(herman):
     repeated, more = normal(16 * some)
     assert_allclose(repeated, 4.0 * once, rtol=1e-9, atol=1e-9 * np.abs(once).max())
     assert more < 1.2 * peak
+
+
+def test_starts_that_a_diverging_model_cannot_tell_apart_are_no_error():
+    """Beside 1e30 the 1e-2 of each start are rounded away: the matrix has rank one."""
+    rng = np.random.default_rng(1)
+    cross, right = rng.normal(size=(2, 9, 3)), rng.normal(size=(2, 9))
+    inner = np.array([1e30 * np.ones((9, 9)), np.diag(np.arange(1.0, 10.0))])
+    A, g, back = Normal(1.0, np.eye(3), np.ones(3), cross, inner, right).eliminated()
+    of_second = cross[1] / np.arange(1.0, 10.0)[:, None]
+    assert_allclose(A, np.eye(3) - cross[1].T @ of_second, rtol=1e-9, atol=1e-9)
+    assert_allclose(g, 1.0 - right[1] @ of_second, rtol=1e-9, atol=1e-9)
+    assert_allclose(back[1][:, :3], of_second, rtol=1e-9)
 
 
 def test_damping_of_a_vehicle_that_gains_speed_is_held_where_it_takes_energy():

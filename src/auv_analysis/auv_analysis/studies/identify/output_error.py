@@ -23,6 +23,7 @@ STEP = 3e-7  # of theta, for derivatives: as much truncated as rounded
 CERTAIN, UNSEEN = 10.0, 0.3  # of starts: deviations of the noise; m/s, rad/s where not measured
 BYTES = 1 << 24  # of states that are held at once
 LARGEST = 1.5  # step of theta
+APART = 1e-12  # of a start's square: what tells starts apart that move a diverging model alike
 BLOCKS, MOST_BLOCKS = 24, 400  # of time, of which the jackknife leaves out one after the other
 LEVEL = 0.95  # of intervals
 
@@ -49,7 +50,7 @@ class Normal:
 
     def eliminated(self, damping: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """A (n, n) and g (n,) without the starts, and (S, 9, n + 1) what they answer to theta."""
-        damped = self.inner * (1.0 + damping * np.eye(9))
+        damped = self.inner * (1.0 + (damping + APART) * np.eye(9))
         back = np.linalg.solve(damped, np.concatenate([self.cross, self.right[..., None]], axis=2))
         taken = np.tensordot(self.cross, back, ([0, 1], [0, 1]))
         return self.A - taken[:, :-1], self.g - taken[:, -1], back

@@ -18,6 +18,7 @@ from auv_analysis.studies.identify.identify import (
     Settings,
     _dissipative,
     _of_still,
+    _with_best_delay,
     feeding,
     identify,
     split,
@@ -274,6 +275,19 @@ def test_normal_equations_of_a_longer_recording_take_no_more_memory(herman):
     repeated, more = normal(16 * some)
     assert_allclose(repeated, 4.0 * once, rtol=1e-9, atol=1e-9 * np.abs(once).max())
     assert more < 1.2 * peak
+
+
+def test_delays_are_looked_for_within_the_commands_that_are_known():
+    """Where the recording tells nothing of it, every delay is as good as another."""
+    prior = load_vehicle('herman2018')
+    u = unknowns(prior, ('lag', 'delay'), (), speeds=np.ones(6), wrenches=np.ones(6))
+
+    def fit(late, theta, starts, **_):
+        return SimpleNamespace(unknowns=late, theta=theta, starts=starts, cost=1.0)
+
+    tried = _with_best_delay(SimpleNamespace(step=0.05, fit=fit), u, np.zeros(1), 0.1, 9.0)
+    delays = sorted(float(one.unknowns.prior.delay) for one in tried)
+    assert_allclose(delays, 0.05 * np.arange(13), atol=1e-12)
 
 
 def test_starts_that_a_diverging_model_cannot_tell_apart_are_no_error():

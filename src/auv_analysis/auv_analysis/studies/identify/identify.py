@@ -373,7 +373,7 @@ def _with_best_delay(
     tried = {k: attempt(k, with_lag(theta, late - k * problem.step))}
     for way in (-1, 1):
         j = k
-        while j + way >= 0 and j + way not in tried:
+        while 0 <= j + way <= np.ceil(HISTORY / problem.step) and j + way not in tried:
             lag = float(u.coefficients(tried[j].theta).lag) - way * problem.step
             tried[j + way] = attempt(j + way, with_lag(tried[j].theta, lag), tried[j].starts)
             if tried[j + way].cost > tried[j].cost + nearby:

@@ -47,7 +47,7 @@ help:  ## this list
 setup: $(READY)  ## the environment in .venv
 
 # by uv in a sixth of pip's CPU time; it sees neither packages of the system nor an index that pip was told of
-UV := $(BIN)/python -m uv pip install --quiet --native-tls --python $(BIN)/python
+UV := $(BIN)/python -m uv pip install --quiet --system-certs --python $(BIN)/python
 PIP := $(BIN)/python -m pip install --quiet --no-compile
 install = { test -z "$(VENV_OPTIONS)" && ! $(BIN)/python -m pip config list | grep -q '\.index-url' && $(UV) $(1); } || $(PIP) $(1)
 
@@ -55,7 +55,7 @@ install = { test -z "$(VENV_OPTIONS)" && ! $(BIN)/python -m pip config list | gr
 $(RUNS): Makefile $(TO_RUN) $(SOURCES)
 	@$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 11), "Python 3.11 or newer is needed, found " + sys.version.split()[0]'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV_OPTIONS) $(VENV)
-	$(PIP) 'uv>=0.5,<1' || true
+	$(PIP) 'uv>=0.13,<1' || true
 	$(call install,$(foreach r,$(TO_RUN),-r $(r)))
 	$(PIP) --no-deps --no-build-isolation --use-pep517 $(foreach p,$(PACKAGES),-e src/$(p))
 	@touch $@

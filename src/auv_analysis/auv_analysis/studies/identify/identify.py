@@ -102,7 +102,7 @@ def split(records: Sequence[Record], share: float) -> tuple[list[Record], list[R
         left -= length
     first, last = long_enough(first), long_enough(last)
     if not first:
-        expected = 'a share that leaves a second and more to learn from'
+        expected = 'a share that leaves a second with nine samples and more to learn from'
         raise InputError('--holdout', '', expected, f'{share:g} of {total:.3g} s')
     return first, last
 

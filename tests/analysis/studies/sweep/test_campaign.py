@@ -11,7 +11,13 @@ from helpers.strategies import QUICK
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from auv_analysis.studies.sweep.campaign import Campaign, first_words, load_campaign
+from auv_analysis.studies.sweep.campaign import (
+    Campaign,
+    concerns,
+    first_words,
+    load_campaign,
+    of_controller,
+)
 from auv_dynamics.files.errors import InputError
 
 SOURCE = """
@@ -97,6 +103,12 @@ def test_seed_is_that_of_root_and_index(mixed: Campaign) -> None:
     assert len(np.unique(seeds)) == 384
 
 
+def test_a_seed_may_be_written_as_a_float(mixed: Campaign, tmp_path: Path) -> None:
+    again = load_campaign(written(tmp_path, SOURCE.replace('seed: 5', 'seed: 5.0')))
+    assert (again.data['seed'], type(again.data['seed'])) == (5, int)
+    assert (again.seeds(0, 9) == mixed.seeds(0, 9)).all()
+
+
 def test_defaults_are_filled_in(tmp_path: Path) -> None:
     text = 'name: x\nscenario: case1\nvary: [{grid: {duration: [1.0]}}]'
     campaign = load_campaign(written(tmp_path, text))
@@ -123,18 +135,76 @@ def test_readme_counts_the_shipped_campaign() -> None:
     assert f'{campaign.rollouts} rollouts of each controller' in readme
 
 
-def test_blocks_are_shorter_where_rollouts_are_longer(tmp_path: Path) -> None:
-    def block(duration: float, count: int) -> int:
-        scenario = (Path(__file__).parents[4] / 'config/scenarios/case1.yaml').read_text()
-        text = scenario.replace('duration: 30.0', f'duration: {duration}')
-        (tmp_path / 'scenario.yaml').write_text(text)
-        text = ('name: x\nscenario: scenario.yaml\nvary: [{random: {duration: {uniform: '
-                f'{{from: 1, to: 2}}}}}}, count: {count}}}]')  # fmt: skip
-        return load_campaign(written(tmp_path, text)).block
+@pytest.mark.parametrize(
+    ('duration', 'count', 'block'),
+    [
+        (10.0, 10_000, 500),  # of 1000 steps each: half a million
+        (100.0, 10_000, 50),
+        (10_000.0, 1000, 16),
+        (10.0, 2_001, 251),  # an eighth
+        (10.0, 20, 16),
+        (1.0, 100_000, 1024),
+        (10.0, 10**7, 39_063),  # of at most 256 files
+    ],
+)
+def test_blocks_are_shorter_where_rollouts_are_longer(
+    tmp_path: Path, monkeypatch, duration: float, count: int, block: int
+) -> None:
+    scenario = (Path(__file__).parents[4] / 'config/scenarios/case1.yaml').read_text()
+    text = scenario.replace('duration: 30.0', f'duration: {duration}')
+    (tmp_path / 'scenario.yaml').write_text(text)
+    text = ('name: x\nscenario: scenario.yaml\nvary: [{random: {duration: {uniform: '
+            f'{{from: 1, to: 2}}}}}}, count: {count}}}]')  # fmt: skip
+    campaign = load_campaign(written(tmp_path, text))
+    assert campaign.block == block
+    monkeypatch.setattr(Campaign, 'own_laws', {'gvc': object})  # which run as plain Python
+    assert campaign.block == max(8, -(-count // 256))
 
-    assert block(10.0, 10_000) > block(100.0, 10_000) >= block(10_000.0, 10_000) > 1
-    assert block(10.0, 20) <= 20
-    assert 10**7 / block(10.0, 10**7) <= 256  # files
+
+def test_there_are_not_more_rollouts_than_a_float_can_count(tmp_path: Path) -> None:
+    drawn = "  - random: {{'{}': {{uniform: {{from: 1, to: 2}}}}}}\n    count: {}\n"
+    text = 'name: x\nscenario: case1\nvary:\n' + drawn.format('duration', 2**30)
+    most = load_campaign(written(tmp_path, text + drawn.format('initial.nu[0]', 2**23)))
+    assert most.rollouts == 2**53
+    expected = f'vary: expected at most {2**53} rollouts, found {2**53 + 2**30}'
+    with pytest.raises(InputError, match=expected):
+        load_campaign(written(tmp_path, text + drawn.format('initial.nu[0]', 2**23 + 1)))
+
+
+def test_vehicles_may_be_drawn(tmp_path: Path) -> None:
+    text = ('name: x\nscenario: case1\nvary: [{random: {vehicle: {choice: [herman2018, rexrov]}}, '
+            'count: 4}]')  # fmt: skip
+    scenarios = load_campaign(written(tmp_path, text)).scenarios
+    assert {name: one.vehicle.name for name, one in scenarios.items()} == {
+        'herman2018': 'herman2018', 'rexrov': 'rexrov',
+    }  # fmt: skip
+    expected = (
+        r'vary.0..random.vehicle: expected a list of names or paths of vehicles, found .*from'
+    )
+    with pytest.raises(InputError, match=expected):
+        load_campaign(written(tmp_path, text.replace('choice: [herman2018, rexrov]',
+                                                     'integers: {from: 1, to: 2}')))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ('path', 'controller', 'own'),
+    [
+        ('controllers.*.k_D', 'cl', 'controllers.cl.k_D'),
+        ('controllers.*.k_D', 'cl.2', "controllers.'cl.2'.k_D"),
+        ("controllers.'cl.2'.k_D", 'cl.2', "controllers.'cl.2'.k_D"),
+        ('controllers.gvc.k_D', 'cl', None),
+        ('duration', 'cl', 'duration'),
+        ('vehicle.rigid_body.mass', 'cl', 'vehicle.rigid_body.mass'),
+    ],
+)
+def test_what_a_path_means_for_a_controller(path: str, controller: str, own: str | None) -> None:
+    assert concerns(path, controller) == (own is not None)
+    assert of_controller(path, controller) == (own or path)
+
+
+def test_files_that_a_campaign_was_read_from(mixed: Campaign) -> None:
+    names = ['campaign.yaml', 'case1.yaml', 'herman2018.yaml', 'rexrov.yaml']
+    assert sorted(path.name for path in mixed.inputs) == names
 
 
 def test_ten_million_rollouts_take_no_memory_of_their_number(tmp_path: Path) -> None:
@@ -166,7 +236,11 @@ REPLACED = {  # old text, new text -> what the one line says
     ('controllers.*.k_D', 'controllers.pid.k_D'): 'expected one of gvc, cl',
     ('controllers.*.k_D', 'controllers.*'): 'grid.controllers..: expected',
     ('controllers.*.k_D', 'seed'): "grid.seed: expected nothing: a rollout's seed",
-    ('controllers.*.k_D', 'name'): 'grid.name: expected nothing',
+    ('controllers.*.k_D', 'name'): 'grid.name: expected nothing: a sweep has one name, found name',
+    ('controllers.*.k_D', 'format'): 'grid.format: expected nothing: there is one format',
+    ('controllers.*.k_D', 'setpoint.file'): 'grid.setpoint.file: expected nothing: one file',
+    ('controllers.*.k_D', '"\'format\'"'): "grid.'format': expected nothing: there is one format",
+    ('controllers.*.k_D', 'controllers'): 'grid.controllers: expected a path into one of them, or',
     ('controllers.*.k_D', 'a..b'): 'grid.a..b: expected keys and .indices',
     ('controllers.*.k_D', 'actuators.lag'): 'grid.actuators.lag: expected hold: zoh',
     ('initial.nu[2]', 'controllers.*.k_D'): 'each value varied once, found .* in vary.0. as well',

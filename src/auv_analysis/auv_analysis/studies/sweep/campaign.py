@@ -31,6 +31,7 @@ NOT_VARIED = {
     'name': 'nothing: a sweep has one name',
     'format': 'nothing: there is one format',
     'setpoint.file': 'nothing: one file, or a set-point of offsets and terms',
+    'controllers': 'a path into one of them, or into each, such as controllers.*.k_D',
 }
 MOST_ROLLOUTS = 2**53
 STEPS_AT_ONCE = 500_000  # of a block, about: a fraction of a second, compiled
@@ -244,14 +245,14 @@ def _check_varied(campaign: Campaign) -> None:
 
 def _check_path(campaign: Campaign, path: str) -> None:
     parts, names = split(path), campaign.controllers
-    if path in NOT_VARIED:
-        raise InputError(path, '', NOT_VARIED[path], path)
+    if (name := dotted(parts)) in NOT_VARIED:
+        raise InputError(path, '', NOT_VARIED[name], path)
     if campaign.hold == 'continuous' and parts[0] in SAMPLED:
         expected = 'hold: zoh in the campaign: they act on samples'
         raise InputError(path, '', expected, 'hold: continuous')
     for scenario in campaign.scenarios.values():
         check_paths(scenario, [of_controller(path, name) for name in names])
-    if parts[0] == 'controllers' and len(parts) > 1 and parts[1] not in ('*', *names):
+    if parts[0] == 'controllers' and parts[1] not in ('*', *names):
         expected = f'a controller that is swept: {", ".join(names)}{meant(parts[1], names)}'
         raise InputError(path, '', expected, str(parts[1]))
 

@@ -158,7 +158,7 @@ def _damping(vehicle: Vehicle) -> dict[str, Any]:
     rates, modes = np.linalg.eig(np.linalg.solve(vehicle.M, vehicle.D_linear))
     constants = []
     for i in np.argsort(rates.real):
-        energy = np.abs(np.conj(modes[:, i]) * (vehicle.M @ modes[:, i]))
+        energy = np.abs(modes[:, i] * (vehicle.M @ modes[:, i]))
         rate = float(rates[i].real)
         constants.append(
             {

@@ -148,10 +148,10 @@ def _place(r: np.ndarray) -> str:
 
 
 def _facing(normal: np.ndarray) -> str:
-    """Which way a plate faces: along the nearest axis, and how far it is turned from there."""
-    main = int(np.argmax(np.abs(normal)))
-    text = f'facing {WAYS[main][int(normal[main] < 0)]}'
-    angle = float(np.arccos(min(abs(normal[main]), 1.0)))
+    """Which way a plate faces, whose largest part is positive: the nearest axis, how far off it."""
+    main = int(np.argmax(normal))
+    text = f'facing {WAYS[main][0]}'
+    angle = float(np.arccos(min(normal[main], 1.0)))
     if angle < ALIGNED:
         return text
     ways = [

@@ -7,12 +7,19 @@ from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from scipy.stats import f_oneway, spearmanr
+from scipy.stats import f_oneway, rankdata, spearmanr
 
 from auv_analysis.report.plots import distribution, new_figure
-from auv_analysis.studies.sweep.analysis import Analysis, analysed, explained
+from auv_analysis.studies.sweep.analysis import Analysis, analysed, explained, influence
 from auv_analysis.studies.sweep.dataset import by_group, open_sweep
-from auv_analysis.studies.sweep.quantiles import ordered, quantiles, spread, thinned
+from auv_analysis.studies.sweep.quantiles import (
+    Ordered,
+    ordered,
+    quantiles,
+    spread,
+    thinned,
+    varying,
+)
 
 
 def test_figures_that_never_differ_are_named_not_analysed(results: Analysis) -> None:
@@ -104,6 +111,14 @@ def test_best_rows_are_the_smallest(results: Analysis) -> None:
     assert [row['rank'] for row in mine] == list(range(1, 11))
     assert mine[0][ENERGY] == np.nanmin(results.values[ENERGY][results.rows_of('cl')])
     assert mine[0][ENERGY] == pytest.approx(1.5 * mine[0][K_D] ** 2)
+    energies = [row[ENERGY] for row in mine]
+    assert energies == sorted(energies)
+    table = results.sweep.table(['index', 'seed', K_D, DAMPING]).to_pylist()
+    for row in mine:
+        given = next(r for r in table if r['index'] == row['rollout'])
+        assert {key: row[key] for key in ('seed', K_D, DAMPING)} == {
+            key: given[key] for key in ('seed', K_D, DAMPING)
+        }
 
 
 def test_what_varies_says_its_unit(results: Analysis) -> None:
@@ -147,6 +162,94 @@ def test_a_time_that_does_not_exist_is_late() -> None:
     assert spread(np.array([1.0, 2.0, np.nan]), 's')['median'] == 2.0
     assert spread(np.array([1.0, 2.0, np.nan]), 'N')['median'] == 1.0
     assert spread(np.full(2, np.nan), 's')['median'] is None
+
+
+@pytest.mark.parametrize(('unit', 'high'), [('s', None), ('N', 36.0)])
+def test_a_spread_has_all_its_numbers(unit: str, high: float | None) -> None:
+    rng = np.random.default_rng(0)
+    values = rng.permutation([*np.arange(1.0, 38.0), *[np.nan] * 3])
+    latest = 40 if unit == 's' else 37  # of so many the level is taken
+    levels = {'low': 0.05, 'quarter': 0.25, 'median': 0.5, 'three_quarters': 0.75}
+    at = {name: float(np.ceil(level * latest)) for name, level in levels.items()}
+    assert spread(values, unit) == {
+        'rows': 40, 'known': 37, 'smallest': 1.0, **at, 'high': high, 'largest': 37.0, 'mean': 19.0,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize('unit', ['s', 'N'])
+def test_ranks_are_those_of_scipy_and_equal_ones_share_theirs(unit: str) -> None:
+    values = np.array([3.0, 1.0, np.nan, 3.0, 2.0, 3.0, 1.0, np.nan])
+    late = np.where(np.isnan(values), np.inf, values)
+    found = Ordered.of(values, unit)
+    expected = rankdata(late) if unit == 's' else rankdata(values, nan_policy='omit')
+    np.testing.assert_array_equal(found.ranks, expected)
+    np.testing.assert_array_equal(found.ascending, values[found.places] if unit == 'N'
+                                  else late[found.places])  # fmt: skip
+    groups = found.groups(np.array([0, 1, 1, 2, 2, 0, 2, 2]), 4)
+    assert [list(group) for group in groups] == [
+        [3.0, 3.0], [1.0, np.inf] if unit == 's' else [1.0],
+        [1.0, 2.0, 3.0, np.inf] if unit == 's' else [1.0, 2.0, 3.0], [],
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ('values', 'unit', 'found'),
+    [
+        ([[1.0, 1.0], [1.0]], 's', False),
+        ([[1.0], [1.0 + 1e-9]], 'N', True),
+        ([[1.0], [1.0 + 1e-14]], 'N', False),
+        ([[-1e15, -1e15 - 10.0]], 'N', False),
+        ([[1.0, np.nan]], 'N', False),
+        ([[1.0], [np.nan]], 's', True),
+        ([[np.nan], [np.nan]], 's', False),
+        ([[0.0, 0.0]], 'N', False),
+    ],
+)
+def test_whether_a_figure_varies(values: list[list[float]], unit: str, found: bool) -> None:
+    assert varying([np.array(part) for part in values], unit) is found
+
+
+def test_rows_that_failed_have_no_say(tmp_path) -> None:
+    def failing(controller, values, index):
+        status = np.where(index % 2, 'ok', 'diverged').astype(object)
+        return {'status': status, ENERGY: np.where(index % 2, 5.0, 99.0)}
+
+    found = analysed(open_sweep(make_sweep(tmp_path, SIMPLE, failing, range(2))), ENERGY)
+    assert found.fixed[ENERGY] == 5.0
+    (row,) = rows(found, 'quantiles', figure=ENERGY, controller='cl')
+    assert (row['rows'], row['known'], row['largest']) == (50, 50, 5.0)
+    assert {row[ENERGY] for row in found.tables['best']} == {5.0}
+
+
+@pytest.mark.parametrize(
+    ('ranks', 'codes', 'known'),
+    [
+        (np.arange(8.0), [0, 0, 0, 0, 1, 1, 1, 1], True),
+        (np.arange(7.0), [0, 0, 0, 0, 1, 1, 1], False),
+        (np.arange(8.0), [2] * 8, False),
+        (np.full(8, 4.5), [0, 0, 0, 0, 1, 1, 1, 1], False),
+        (np.arange(8.0), list(range(8)), False),
+        (np.arange(9.0), [*range(8), 7], True),
+        (np.arange(8.0), [0, 0, 0, 0, 9, 9, 9, 9], True),
+    ],
+)
+def test_influence_needs_some_rows_in_some_groups(ranks, codes, known: bool) -> None:
+    assert (influence(ranks, np.array(codes), None) is not None) is known
+
+
+def test_the_commonest_reasons_come_first(tmp_path) -> None:
+    def failing(controller, values, index):
+        which = np.searchsorted([0, 2, 5, 9, 20, 26], index % 50, side='right')  # 24, 11, 6, ...
+        status = np.where(which > 3, 'diverged', 'refused').astype(object)
+        return {'status': status, 'reason': np.array([f'r{k}' for k in which], object)}
+
+    sweep = open_sweep(make_sweep(tmp_path, SIMPLE, failing, range(1)))
+    assert Analysis(sweep, [], {}).reasons() == [
+        {'status': status, 'reason': reason, 'rows': 2 * rows}
+        for status, reason, rows in (('diverged', 'r6', 24), ('diverged', 'r4', 11),
+                                     ('diverged', 'r5', 6), ('refused', 'r3', 4),
+                                     ('refused', 'r2', 3))
+    ]  # fmt: skip
 
 
 def test_a_distribution_of_times_ends_where_the_rest_never_settles() -> None:

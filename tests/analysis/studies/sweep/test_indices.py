@@ -133,6 +133,15 @@ def test_morris_leaves_out_the_trajectory_of_a_failed_row(tmp_path: Path) -> Non
         assert found[path]['sigma'] == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize('count', [7, 8])
+def test_of_fewer_than_eight_trajectories_there_are_no_indices(tmp_path: Path, count: int) -> None:
+    text = MORRIS.replace('count: 12', f'count: {count}')
+    found = indices(make_sweep(tmp_path, text, linear))
+    assert [(row['path'], row['points'], row['of']) for row in found] == (
+        [(path, 8, 8) for path in (A, B, C)] if count == 8 else []
+    )
+
+
 def test_values_of_another_design_are_not_taken_for_it(tmp_path: Path, approved) -> None:
     few = SALTELLI.replace('256', '16')
     out = make_sweep(tmp_path, few.replace('name: salt', 'name: salt\nseed: 3'), linear)
@@ -146,11 +155,17 @@ def test_values_of_another_design_are_not_taken_for_it(tmp_path: Path, approved)
 
 def test_many_other_combinations_are_said(tmp_path: Path, approved) -> None:
     many = "grid: {'initial.nu[0]': [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]}"
-    text = SALTELLI.replace('grid: {integrator: [ode5, rk4]}', many).replace('256', '8')
+    text = SALTELLI.replace('grid: {integrator: [ode5, rk4]}', many)
+    text = text.replace('count: 256', 'count: 8')
     found, notes = designed(open_sweep(make_sweep(tmp_path, text, linear)))
     assert found == []
     assert '9 combinations' in notes[0]
     approved.add(notes)
+    (tmp_path / 'fewer').mkdir()
+    text = text.replace(', 0.8]', ']')
+    (found,), notes = designed(open_sweep(make_sweep(tmp_path / 'fewer', text, linear)))
+    assert found.cases == [f'initial.nu[0] = {k / 10}' for k in range(8)]
+    assert notes == []
 
 
 def test_without_salib_it_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,11 +1,18 @@
 """A sweep: the figures of its simulations, the same rows whatever runs it, bounded work ahead."""
 
 import math
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+import os
+from concurrent.futures import (
+    CancelledError,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+)
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 import yaml
 from helpers.sweeps import CAMPAIGN, ROLLOUTS, SCENARIO, Counting, parts, rows, run, write_files
@@ -14,7 +21,10 @@ from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.studies.sweep import engine as sweep_block
 from auv_analysis.studies.sweep.campaign import load_campaign
+from auv_analysis.studies.sweep.engine import Outcome, SweepStoppedError, opened, sweep
 from auv_analysis.studies.sweep.engine import _column as column
+from auv_analysis.studies.sweep.folder import sweep_folder
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle import DOFS
 
 
@@ -113,6 +123,90 @@ def test_worker_with_other_versions_is_refused(files: Path, monkeypatch) -> None
     monkeypatch.setattr(sweep_block, 'versions', lambda: there)
     with pytest.raises(sweep_block.BlockError, match='found another sources, numba'):
         sweep_block.block_figures(contents, ['gvc'], 'continuous', {}, campaign.seeds(0, 1))
+
+
+def test_worker_that_lacks_a_law_says_so(files: Path, monkeypatch) -> None:
+    def lacking(*_) -> None:
+        raise InputError('s.yaml', 'controllers.mine.law', 'a module', 'mine:Law')
+
+    monkeypatch.setattr(sweep_block, '_figures', lacking)
+    with pytest.raises(SweepStoppedError, match=r'^a worker cannot run this: s.yaml: controllers'):
+        run(files)
+
+
+Lost = type('Lost', (Exception,), {'__module__': 'distributed.scheduler'})
+
+
+@pytest.mark.parametrize(
+    ('error', 'line'),
+    [
+        (Lost('tcp://1.2.3.4'), 'the workers are lost (Lost)'),
+        (CancelledError(), 'the workers are lost (CancelledError)'),
+        (BrokenProcessPool('one is gone'), 'the workers are lost (BrokenProcessPool)'),
+        (OSError('no space\nleft'), 'no space'),
+        (ZeroDivisionError('of a law'), 'of a law'),
+        (sweep_block.BlockError('other versions'), 'other versions'),
+        (KeyError('a fault of the program'), None),
+    ],
+    ids=repr,
+)
+def test_what_stops_a_sweep_is_said_and_a_fault_of_the_program_is_none(
+    error: Exception, line: str | None, files: Path, monkeypatch
+) -> None:
+    def fail(*_) -> None:
+        raise error
+
+    monkeypatch.setattr(sweep_block, 'block_figures', fail)
+    with pytest.raises(SweepStoppedError if line else KeyError) as stopped:
+        run(files)
+    assert line is None or str(stopped.value) == line
+
+
+def test_progress_is_told_in_finished_rollouts(files: Path) -> None:
+    campaign, told = load_campaign(files / 'campaign.yaml'), []
+    with sweep_folder(files / 'out', campaign, overwrite=False) as folder:
+        sweep(campaign, folder, ThreadPoolExecutor(1), lambda: 1, told.append)
+    assert told == [5, 10, 15, 16]
+    (files / 'out/rollouts/part-00000001.parquet').unlink()
+    with sweep_folder(files / 'out', campaign, overwrite=False) as folder:
+        found = sweep(campaign, folder, ThreadPoolExecutor(1), lambda: 1, told.append)
+    assert told[4:] == [5, 10, 11, 16], 'what was there already counts'
+    assert (found.before, found.rollouts) == (11, 16)
+
+
+def test_an_outcome_keeps_the_first_reason_of_what_was_refused() -> None:
+    found = Outcome()
+    for status, reason in ((['ok', 'diverged'], ['', 'not finite']),
+                           (['refused', 'diverged'], ['too light', 'later']),
+                           (['refused', 'refused'], ['too heavy', 'again'])):  # fmt: skip
+        rows = {'controller': ['gvc', 'cl'], 'status': status, 'reason': reason}
+        found.add(pa.table(rows), 2)
+    assert (found.reason, found.rollouts) == ('too light', 3)
+    assert found.counts == {('gvc', 'ok'): 1, ('gvc', 'refused'): 2, ('cl', 'diverged'): 2,
+                            ('cl', 'refused'): 1}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ('options', 'line'),
+    [
+        (('threads', 'tcp://a:1', None), '--scheduler: expected no scheduler .*, found tcp://a:1'),
+        ((None, 'tcp://a:1', 3), '--workers: expected no number beside --scheduler: .*, found 3'),
+    ],
+)
+def test_executors_that_contradict_themselves_are_refused(options, line: str) -> None:
+    with pytest.raises(InputError, match=line), opened(*options):
+        pass
+
+
+@pytest.mark.parametrize('kind', [None, 'threads'])
+def test_each_thread_has_a_block_and_one_that_waits(kind: str | None) -> None:
+    cores = len(os.sched_getaffinity(0))
+    for workers, count in ((3, 3), (None, cores)):
+        with opened(kind, None, workers) as (executor, in_flight):
+            assert isinstance(executor, ThreadPoolExecutor)
+            assert (executor._max_workers, in_flight()) == (count, 2 * count)
+        with pytest.raises(RuntimeError, match='shutdown'):
+            executor.submit(int)
 
 
 @pytest.mark.parametrize(

@@ -57,8 +57,10 @@ def test_part_that_is_missing_or_broken_is_made_again(files: Path) -> None:
     (data / 'part-00000001.parquet').unlink()
     (data / 'part-00000002.parquet').write_bytes(before['part-00000002.parquet'][:-9])
     (data / '.part-00000003.parquet.unfinished').write_bytes(b'half')
+    (files / 'out/.sweep.json.unfinished').write_bytes(b'{')
     assert run(files).before == ROLLOUTS - 10
     assert parts(files / 'out') == before
+    assert not list((files / 'out').glob('.sweep*'))
 
 
 def test_a_sweep_does_not_go_on_with_another_set_point(files: Path) -> None:
@@ -72,6 +74,11 @@ def test_a_sweep_does_not_go_on_with_another_set_point(files: Path) -> None:
     (files / 'way.csv').write_text(way.replace('0.5', '0.6'))
     with pytest.raises(InputError, match=r'setpoint\.csv'):
         run(files)
+    (files / 'way.csv').rename(files / 'moved.csv').write_text(way)
+    (files / 'scenario.yaml').write_text(
+        yaml.safe_dump(scenario | {'setpoint': {'file': 'moved.csv'}})
+    )
+    assert run(files).before == 2, 'what the file is called is all the same'
 
 
 CHANGED = {  # file, old, new -> key that the line names
@@ -79,6 +86,7 @@ CHANGED = {  # file, old, new -> key that the line names
     ('campaign.yaml', 'to: 90', 'to: 91'): r'uniform.to: expected 90 .*',
     ('campaign.yaml', 'count: 4', 'count: 5'): r'vary\[1\].count: expected 4',
     ('campaign.yaml', 'block: 5', 'block: 6'): 'campaign.block: expected 5',
+    ('campaign.yaml', '[0.1, 0.2]', '[0.1, 0.2, 0.3]'): r'choice: expected \[0.1, 0.2\] as when',
     ('campaign.yaml', 'seed: 11', 'seed: 11\ncontrollers: [gvc]'): 'campaign.controllers: expected',
     ('scenario.yaml', 'k_I: 1.0', 'k_I: 2.0'): 'scenario.controllers.gvc.k_I: expected 1.0 as',
     ('scenario.yaml', 'duration: 0.3', 'duration: 0.4'): 'scenario.duration: expected 0.3',
@@ -122,9 +130,12 @@ def test_folder_is_refused_when_machine_or_versions_differ(files: Path, monkeypa
             pass
 
     begun()
+    kept = json.loads((files / 'out/sweep.json').read_text())['versions']
+    assert {'sources', 'python', 'numpy', 'scipy', 'SALib', 'machine'} <= set(kept)
     version = metadata.version
     for where, name, other, key in (
         (metadata, 'version', lambda of: '1.0' if of == 'SALib' else version(of), 'SALib'),
+        (metadata, 'version', lambda of: '1.0' if of == 'scipy' else version(of), 'scipy'),
         (platform, 'machine', lambda: 'another', 'machine'),
     ):
         with monkeypatch.context() as patch:
@@ -137,6 +148,32 @@ def test_folder_is_refused_when_machine_or_versions_differ(files: Path, monkeypa
     path.write_text(json.dumps(manifest))
     with pytest.raises(InputError, match=r'versions.numpy: expected "1.0" as when it was begun'):
         begun()
+
+
+@pytest.mark.parametrize(
+    ('vary', 'drawn_by'),
+    [
+        ('grid: {controllers.*.k_D: [6, 12]}', set()),
+        ('zip: {controllers.*.k_D: [6, 12]}', set()),
+        ('random: {controllers.*.k_D: {uniform: {from: 6, to: 12}}}, count: 2', {'scipy'}),
+    ],
+)
+def test_only_what_drew_the_samples_must_stay_the_same(vary: str, drawn_by, files: Path) -> None:
+    text = f'name: x\nscenario: scenario.yaml\nvary: [{{{vary}}}]\n'
+    (files / 'campaign.yaml').write_text(text)
+    with sweep_folder(files / 'out', load_campaign(files / 'campaign.yaml'), overwrite=False):
+        kept = json.loads((files / 'out/sweep.json').read_text())['versions']
+    assert kept.keys() & {'scipy', 'SALib'} == drawn_by
+
+
+@pytest.mark.parametrize('text', ['{', '[]', '{"block": "5"}', '{"campaign": {}}'])
+def test_a_manifest_that_is_none_of_a_sweep_is_refused(text: str, files: Path) -> None:
+    (files / 'out').mkdir()
+    (files / 'out/sweep.json').write_text(text)
+    expected = r'--out: expected a folder of .auv sweep., or --overwrite, found a sweep.json that'
+    with pytest.raises(InputError, match=expected):
+        run(files)
+    assert (files / 'out/sweep.json').read_text() == text
 
 
 def test_folder_that_another_process_sweeps_into_is_refused(files: Path) -> None:

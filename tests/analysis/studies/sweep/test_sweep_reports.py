@@ -74,14 +74,22 @@ def test_bins_are_joined_where_they_are_many(results: Analysis) -> None:
     [
         (lambda out: _part(out).write_bytes(b'PAR1'), 'part-00000001.parquet: expected a finished'),
         (lambda out: _damage(_part(out)), 'part-00000001.parquet: expected a finished part'),
-        (lambda out: _without(_part(out)), 'part-00000001.parquet: controllers.*expected a column'),
+        (lambda out: _without(_part(out), K_D), 'part-00000001.parquet: controllers.*: expected a '
+                                                'column'),
+        *((lambda out, name=name: _without(_part(out), name), f'{name}: expected a column of every')
+          for name in ('index', 'controller', 'seed', 'status', 'reason')),
+        (lambda out: _lost(_part(out)), "status: expected one of ok, diverged, .*, found .*'lost'"),
+        (lambda out: change_manifest(out, rollouts='800'), 'expected campaign and rollouts'),
+        (lambda out: _change_campaign(out, controllers=['gvc', '']), 'expected campaign and'),
+        (lambda out: _change_campaign(out, vary=[]), 'expected campaign and rollouts'),
+        (lambda out: _change_campaign(out, vary=[{'grids': {}}]), 'expected campaign and rollouts'),
         (lambda out: (out / 'sweep.json').write_text('{'), 'sweep.json: expected the manifest'),
         (lambda out: (out / 'sweep.json').write_text('[]'), 'expected campaign and rollouts'),
         (lambda out: change_manifest(out, campaign={}), 'expected campaign and rollouts'),
         (lambda out: [p.unlink() for p in (out / 'rollouts').iterdir()], 'no part-'),
         (lambda out: (out / 'rollouts').rename(out / 'gone'), 'expected the rows of a sweep'),
     ],
-)
+)  # fmt: skip
 def test_a_broken_sweep_is_refused_in_one_line(tmp_path: Path, spoil, words: str) -> None:
     out = make_sweep(tmp_path, SIMPLE, simple, range(3))
     spoil(out)
@@ -100,9 +108,20 @@ def _damage(path: Path) -> None:
     path.write_bytes(data)
 
 
-def _without(path: Path) -> None:
+def _without(path: Path, column: str) -> None:
+    parquet.write_table(parquet.read_table(path).drop_columns([column]), path)
 
-    parquet.write_table(parquet.read_table(path).drop_columns([K_D]), path)
+
+def _lost(path: Path) -> None:
+    table = parquet.read_table(path)
+    words = ['lost', *table['status'].to_pylist()[1:]]
+    place = table.column_names.index('status')
+    parquet.write_table(table.set_column(place, 'status', [words]), path)
+
+
+def _change_campaign(out: Path, **entries: object) -> None:
+    campaign = json.loads((out / 'sweep.json').read_text())['campaign']
+    change_manifest(out, campaign=campaign | entries)
 
 
 def test_the_document_has_no_nan(results: Analysis) -> None:

@@ -11,6 +11,7 @@ from SALib.sample import sobol
 from scipy import stats
 from scipy.stats import qmc
 
+from auv_analysis.studies.sweep import variation
 from auv_analysis.studies.sweep.variation import (
     MOST_AT_ONCE,
     axis_values,
@@ -81,6 +82,16 @@ def test_quantiles_of_the_ends_are_finite_and_ordered(spec) -> None:
     values = make_distribution(spec).quantile(np.array([0.0, 0.5, 1.0]))
     assert np.isfinite(values).all()
     assert values[0] < values[1] < values[2]
+    ((_, given),) = spec.items()
+    assert given.get('from', -np.inf) <= values[0]
+    assert values[2] <= given.get('to', np.inf)
+
+
+@pytest.mark.parametrize('name', ['uniform', 'loguniform', 'triangular', 'integers'])
+def test_from_a_value_to_itself_there_is_that_value_alone(name: str) -> None:
+    mode = {'mode': 3.0} if name == 'triangular' else {}
+    found = make_distribution({name: {'from': 3.0, 'to': 3.0, **mode}})
+    assert (list(found.quantile(np.array([0.0, 0.4, 1.0]))), found.bounded) == ([3.0] * 3, True)
 
 
 def test_integers_and_choices_are_equally_likely() -> None:
@@ -127,6 +138,12 @@ def test_random_points_are_uniform_and_independent() -> None:
     assert len(np.unique(points)) == points.size
 
 
+def test_random_points_are_the_middles_of_the_floats_of_philox() -> None:
+    key = np.random.SeedSequence(SEED, spawn_key=(0, 2)).generate_state(2, np.uint64)
+    floats = np.random.Generator(np.random.Philox(key=key)).random((16, 4))
+    assert (whole('random', number=2) == floats[:, :3] + 2.0**-54).all()
+
+
 def test_sobol_is_the_sequence_of_scipy() -> None:
     expected = qmc.Sobol(3, rng=stream()).random(16)
     assert (whole('sobol') == expected).all()
@@ -151,6 +168,9 @@ def test_morris_changes_one_value_at_a_time() -> None:
     assert (changed.sum(axis=2) == 1).all()
     assert (changed.sum(axis=1) == 1).all()
     np.testing.assert_allclose(points * 5, np.round(points * 5), atol=1e-12)
+    usual = whole('morris', count=50)
+    np.testing.assert_allclose(np.unique(usual), np.arange(4) / 3)
+    assert not np.array_equal(usual, whole('morris', count=50, seed=SEED + 1))
 
 
 def test_ten_million_points_are_made_where_they_are_asked_for() -> None:
@@ -171,10 +191,31 @@ def test_grid_and_zip_give_what_is_listed() -> None:
     assert beside.at(np.array([1, 0, 1]))['b'] == [[4.0], [3.0], [4.0]]
 
 
+def test_numbers_are_whole_where_all_of_a_list_are_and_fit() -> None:
+    for values, kind in (([3, 2], 'i'), ([3, 2.0], 'f'), ([2**63 - 1, 2], 'i'), ([2**63, 2], 'f'),
+                         ([-(2**63), 2], 'f'), ([True, False], 'b')):  # fmt: skip
+        found = axis_values(values)
+        assert (found.dtype.kind, found.tolist()) == (kind, values)
+
+
 def test_ranges_have_both_ends() -> None:
     np.testing.assert_allclose(axis_values({'from': 1, 'to': 2, 'count': 5}), 1 + np.arange(5) / 4)
     log = axis_values({'from': 1, 'to': 1000, 'count': 4, 'spacing': 'log'})
     np.testing.assert_allclose(log, [1, 10, 100, 1000])
+    same = {'from': -4, 'to': -1, 'count': 3, 'spacing': 'linear'}
+    np.testing.assert_allclose(axis_values(same), [-4.0, -2.5, -1.0])
+    np.testing.assert_allclose(axis_values(same | {'spacing': 'log'}), [-4.0, -2.0, -1.0])
+
+
+def test_a_whole_number_may_be_written_as_a_float() -> None:
+    assert make_group({'random': {'a': UNIFORM}, 'count': 4.0}, SEED, 0, 'file').size == 4
+
+
+def test_a_design_that_is_made_as_a_whole_is_as_large_as_is_allowed(monkeypatch) -> None:
+    monkeypatch.setattr(variation, 'MOST_AT_ONCE', 16 * len(PATHS))
+    assert design('latin_hypercube', count=16).size == 16
+    with pytest.raises(ValueError, match='at most 16 points of 3 values'):
+        design('latin_hypercube', count=17)
 
 
 def drawn(kind: str = 'random', count: int = 2, **specs) -> dict:
@@ -188,13 +229,20 @@ REFUSED = [  # a group, what its one line says
     ({'grid': {'a': [[1, [2]]]}}, 'a list or matrix of numbers'),
     ({'grid': {'a': [[1, float('inf')]]}}, 'finite numbers'),
     ({'grid': {'a': {'from': -1, 'to': 1, 'count': 3, 'spacing': 'log'}}}, 'of one sign for'),
+    ({'grid': {'a': {'from': 0, 'to': 1, 'count': 3, 'spacing': 'log'}}}, 'log, found 0 to 1'),
     (drawn(a={'uniform': {'from': 2, 'to': 1}}), 'random.a: expected a number from 2 up in to'),
     (drawn(a={'triangular': {'from': 0, 'mode': 3, 'to': 1}}), 'a mode from 0 to 1, found 3'),
+    (drawn(a={'triangular': {'from': 1, 'mode': 0, 'to': 4}}), 'a mode from 1 to 4, found 0'),
+    (drawn(a={'normal': {'mean': 5, 'std': 2, 'from': 9, 'to': 3}}), 'found 2 to -1 standard dev'),
     (drawn(a={'normal': {'mean': 0, 'std': 1, 'from': 40, 'to': 41}}), 'probability between'),
     (drawn('morris', a={'normal': {'mean': 0, 'std': 1, 'from': 4}}), 'a: expected from and to'),
     (drawn('morris', a={'normal': {'mean': 0, 'std': 1, 'to': 4}}), 'a: expected from and to'),
     (drawn('latin_hypercube', 6_000_000, a=UNIFORM, b=UNIFORM), 'at most 5000000 points of 2'),
     (drawn('morris', 6_000_000, a=UNIFORM), 'at most 10000000 points'),
+    (
+        drawn('saltelli', 1, **{f'p{i}': UNIFORM for i in range(10_601)}),
+        'saltelli: expected at most 21201 coordinates, found 21202',
+    ),
 ]
 
 

@@ -8,12 +8,14 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from helpers.artists import angles
+from pyarrow import csv, parquet
 
 from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.metrics.measures import MEASURES
 from auv_analysis.metrics.summary import band_of
 from auv_analysis.report.digest import digest
 from auv_analysis.studies.compare import plots
-from auv_analysis.studies.compare.ranking import Entry, comparison_table, rank
+from auv_analysis.studies.compare.ranking import Entry, comparison_table, rank, write_table
 
 SETTLED = 'overall.velocity_error.settling_time'
 SCENARIO = load_scenario('case1')
@@ -70,6 +72,49 @@ def test_ranks_are_by_value_and_what_never_settles_is_last(entries, table) -> No
         assert (rows[run][SETTLED] is None) == run.endswith('/cl')
         assert settled == 3.5 if run.endswith('/cl') else settled < 3
     assert list(ranking.mean_rank) == sorted(ranking.mean_rank)
+
+
+def test_ranks_and_ratios_by_hand() -> None:
+    known = {
+        'kinetic_energy.mean': [8.0, 2.0, 4.0, 0.0, None],
+        'overall.effort.rms.linear': [1.0, 3.0, 1.0, 2.0, 9.0],
+        SETTLED: [None, 5.0, 3.0, None, None],  # of which the last has nothing to follow
+        'overall.velocity_error.rms.linear': [1.0, 1.0, 1.0, 1.0, None],
+    }
+    table = pa.table({
+        'run': [*'abcd', 'free', 'lost'],
+        'failure': [None] * 5 + ['it diverges'],
+        **{m.name: [*known.get(m.name, [7.0] * 5), None] for m in MEASURES},
+    })  # fmt: skip
+    found, nan = rank(table), np.nan
+    assert list(found.runs) == ['c', 'd', 'b', 'a', 'free']
+    ranks, ratios = (
+        {m.name: dict(zip(found.runs, column, strict=True))
+         for m, column in zip(found.measures, columns.T, strict=True)}
+        for columns in (found.ranks, found.ratios)
+    )  # fmt: skip
+    for name, expected in (
+        ('kinetic_energy.mean', [4, 2, 3, 1, nan]), (SETTLED, [3.5, 2, 1, 3.5, nan]),
+        ('overall.effort.rms.linear', [1.5, 4, 1.5, 3, 5]),
+    ):  # fmt: skip
+        of = ranks.pop(name)
+        np.testing.assert_array_equal([of[run] for run in (*'abcd', 'free')], expected)
+    assert not ranks
+    of = ratios['kinetic_energy.mean']
+    np.testing.assert_array_equal([of[r] for r in (*'abcd', 'free')], [1, -1, 0, nan, nan])
+    np.testing.assert_allclose(found.mean_rank, [5.5 / 3, 7.5 / 3, 8 / 3, 3, 5])
+
+
+def test_the_table_that_is_written_has_each_rank_beside_its_run(table, tmp_path: Path) -> None:
+    ranking = rank(table)
+    write_table(table, ranking, tmp_path)
+    for written in (parquet.read_table(tmp_path / 'comparison.parquet'),
+                    csv.read_csv(tmp_path / 'comparison.csv')):  # fmt: skip
+        rows = {row['run']: row for row in written.to_pylist()}
+        for j, measure in enumerate(ranking.measures):
+            ranks = {run: row[f'rank.{measure.name}'] for run, row in rows.items()}
+            assert ranks.pop('lost') is None
+            assert ranks == dict(zip(ranking.runs, ranking.ranks[:, j], strict=True))
 
 
 def test_equal_runs_have_nothing_to_rank(entries) -> None:

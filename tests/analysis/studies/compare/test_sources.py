@@ -1,6 +1,7 @@
 """What the arguments of `auv analyze` stand for, and what runs are called."""
 
 import shutil
+import sys
 import zipfile
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,7 +12,14 @@ import pytest
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.runs.samples import load_samples, write_samples
 from auv_analysis.scenario.scenario import write_inputs
-from auv_analysis.studies.compare.sources import RunSource, is_sweep, named, open_source, sources_of
+from auv_analysis.studies.compare.sources import (
+    RunSource,
+    is_sweep,
+    named,
+    numbered,
+    open_source,
+    sources_of,
+)
 from auv_dynamics import InputError
 
 ROOT = Path(__file__).parents[4]
@@ -115,8 +123,40 @@ def test_every_kind_of_argument(folder: Path, results: Path) -> None:
     assert kinds('runs/short/cl.npz') == both[1:]
     assert kinds('short.yaml') == [('scenario', 'gvc'), ('scenario', 'cl')]
     assert kinds('case1') == kinds('short.yaml')
+    shutil.copy('short.yaml', 'short.yml')
+    assert kinds('short.yml') == kinds('short.yaml')
+    (folder / 'theirs').mkdir()
+    (folder / 'theirs/theirs_0.db3').write_bytes(b'')
+    assert kinds('theirs') == kinds('theirs/theirs_0.db3') == [('bag', '')]
     (results / 'gvc.npz').unlink()
     assert kinds('runs/short', 'case2') == [*both[1:], ('scenario', 'gvc'), ('scenario', 'cl')]
+
+
+def test_files_that_are_read_and_texts_of_what_was_simulated(folder: Path, results: Path) -> None:
+    (samples, *_), (scenario, *_) = sources_of(['runs/short']), sources_of(['short.yaml'])
+    assert [path.name for path in samples.files] == ['gvc.npz', 'scenario.yaml', 'vehicle.yaml']
+    assert [path.name for path in scenario.files] == ['short.yaml', 'herman2018.yaml']
+    found = open_source(samples)
+    assert found.scenario_text == (results / 'scenario.yaml').read_text()
+    assert found.vehicle_text == (results / 'vehicle.yaml').read_text()
+
+
+LAW = "raise RuntimeError('it was imported')"
+
+
+def test_a_law_that_somebody_elses_results_name_is_not_imported(results, monkeypatch) -> None:
+    monkeypatch.syspath_prepend(str(results))
+    (results / 'their_law.py').write_text(LAW)
+    text = (results / 'scenario.yaml').read_text()
+    assert text.count('law: cl') == 1
+    (results / 'scenario.yaml').write_text(text.replace('law: cl', "law: 'their_law:Law'"))
+    words = (
+        r'scenario\.yaml: controllers\.cl\.law: expected a shipped law, or --law .*their_law:Law'
+    )
+    for argument in ('runs/short', 'runs/short/gvc.npz'):
+        with pytest.raises(InputError, match=words):
+            sources_of([argument])
+    assert 'their_law' not in sys.modules
 
 
 def test_bags_of_a_folder_in_the_order_of_its_scenario(folder: Path, results: Path) -> None:
@@ -199,9 +239,18 @@ def test_runs_of_one_name_are_told_apart_by_their_folders() -> None:
     assert found == ['a/gvc', 'b/gvc', 'x/cl']
     found = _names(('/1/a/gvc', 'x', 'gvc'), ('/2/a/gvc', 'x', 'gvc'))
     assert found == ['1/a/gvc', '2/a/gvc']
+    deep = [('/1/b/c/d/gvc', 'x', 'gvc'), ('/2/b/c/d/gvc', 'x', 'gvc')]
+    assert _names(*deep) == ['1/b/c/d/gvc', '2/b/c/d/gvc']
+    assert _names(*((path.replace('b', 'a/b'), *rest) for path, *rest in deep)) == [
+        'x/gvc', 'x/gvc_2',
+    ]  # fmt: skip
+    one = SimpleNamespace(scenario='x', controller='gvc')
+    sources = RunSource('scenario', Path('/1/x.yaml')), RunSource('samples', Path('/1/a/gvc.npz'))
+    assert named([(source, one) for source in sources]) == ['simulated/x/gvc', 'a/gvc']
 
 
 def test_one_run_twice_is_numbered() -> None:
     assert _names(*3 * (('/1/a/gvc', 'x', 'gvc'),)) == ['x/gvc', 'x/gvc_2', 'x/gvc_3']
     twice = ('/1/a/gvc', 'x', 'gvc')
     assert _names(twice, twice, ('/1/b/gvc', 'x', 'gvc')) == ['a/gvc', 'a/gvc_2', 'b/gvc']
+    assert numbered(['a', 'a', 'a_2', 'b']) == ['a', 'a_3', 'a_2', 'b'], 'each keeps its own'

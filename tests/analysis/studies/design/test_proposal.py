@@ -12,7 +12,8 @@ from helpers.report_pages import check_numbers
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.output.folder import ResultsFolder
 from auv_analysis.studies.design import results, search
-from auv_analysis.studies.design.change import ALL, NAMES, semi_axes
+from auv_analysis.studies.design import setting as setting_of
+from auv_analysis.studies.design.change import ALL, NAMES, Parameter, semi_axes
 from auv_analysis.studies.design.prediction import COUPLINGS, Objective, coupling_named
 from auv_analysis.studies.design.report import _findings, change, print_design, write_report
 from auv_analysis.studies.design.results import (
@@ -23,8 +24,8 @@ from auv_analysis.studies.design.results import (
     warnings_of,
     write_results,
 )
-from auv_analysis.studies.design.search import propose
-from auv_analysis.studies.design.setting import change_words, open_setting
+from auv_analysis.studies.design.search import Candidate, propose
+from auv_analysis.studies.design.setting import change_words, open_setting, write_inputs
 from auv_dynamics import InputError, load_vehicle
 from auv_dynamics.files.shipped import shipped
 
@@ -176,6 +177,59 @@ def test_the_scenario_keeps_its_own_controllers(short, tmp_path, monkeypatch):
     assert load_scenario(out / 'scenario.yaml').vehicle.name == 'design_rexrov'
 
 
+LAWS = {
+    'firm': {'law': 'gvc', 'k_D': 12, 'k_I': 1, 'Lambda': 0.8, 'Gamma': 60},
+    'push': {'law': 'pid', 'k_P': 1.0, 'k_I': 1.0, 'k_D': 1.0},
+    'wild': {'law': 'cl', 'k_D': 1e9, 'k_I': 1, 'Lambda': 0.8, 'Gamma': 60},
+}
+
+
+def written(tmp_path, laws=(), **changes):
+    data = yaml.safe_load(SHORT) | changes
+    if laws:
+        data['controllers'] = {name: LAWS[name] for name in laws}
+    path = tmp_path / 'mine.yaml'
+    path.write_text(yaml.safe_dump(data, sort_keys=False))
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ('laws', 'judged'), [(('push', 'wild', 'firm'), 'firm'), (('push', 'wild'), 'push')]
+)
+def test_a_design_is_judged_by_the_first_gvc_or_the_first_there_is(laws, judged, tmp_path):
+    assert open_setting('rexrov', written(tmp_path, laws)).controller == judged
+
+
+@pytest.mark.parametrize(('name', 'changed'), [('n' * 92, 'n' * 92), ('n' * 100, 'n' * 92)])
+def test_a_long_name_has_room_for_what_says_that_it_is_changed(name, changed, tmp_path):
+    setting = open_setting('rexrov', written(tmp_path, name=name))
+    assert write_inputs(setting, None, '', tmp_path).name == f'{changed}_changed'
+
+
+@pytest.mark.parametrize(('duration', 'is_quick'), [(300.0, True), (300.01, False)])
+def test_many_steps_and_a_law_in_python_are_slow(duration, is_quick, tmp_path, monkeypatch):
+    setting = open_setting('rexrov', written(tmp_path, duration=duration))
+    assert setting.is_quick is is_quick
+    monkeypatch.setattr(setting_of, 'is_compiled', lambda _: False)
+    assert setting.is_quick is False
+
+
+def test_a_controller_that_diverges_says_so_beside_the_others(tmp_path):
+    setting = open_setting('rexrov', written(tmp_path, ('firm', 'wild'), duration=0.5))
+    found = results.Simulated.of(setting.scenario, 'continuous')
+    assert (list(found.runs), list(found.summaries)) == (['firm'], ['firm'])
+    assert 'diverges' in found.failures['wild']
+    coupled = results.coupled_in(setting.space.vehicle)
+    told = results._controllers(found, found, coupled)
+    assert (told['wild']['failure'], told['wild']['measures']) == (found.failures['wild'], [])
+    assert told['firm']['failure'] is None
+    assert len(told['firm']['measures']) > 20
+    whole = replace(found, summaries={**found.summaries, 'wild': {}}, failures={})
+    for before, after in ((whole, found), (found, whole)):
+        told = results._controllers(before, after, coupled)
+        assert told['wild']['failure'] == found.failures['wild']
+
+
 def test_a_sampled_scenario_with_a_set_point_of_its_own(tmp_path):
     rows = ''.join(f'{t},{0.3},0,{0.1 * t},0,0,0.05\n' for t in (0.0, 1.0, 2.0))
     (tmp_path / 'way.csv').write_text(f't,surge,sway,heave,roll,pitch,yaw\n{rows}')
@@ -251,6 +305,96 @@ def test_at_any_cost_a_coupling_becomes_less_than_with_an_eye_on_the_others(reme
     assert remedies.at_any_cost(PITCH, 1).ratio < 0.5 * careful.ratio
 
 
+class OfRatios:
+    """Remedies that reach what is told, and note what they are asked for."""
+
+    def __init__(self, *_):
+        self.asked = []
+
+    def targets(self):
+        return [PITCH, 3, 7]
+
+    def candidates(self, target, starts):
+        self.asked.append((target, starts))
+        for x, ratio in self.reached:
+            change = np.zeros(len(NAMES))
+            change[0] = x
+            yield Candidate(target, 'shift', change, 0.5, ratio, 1.0)
+
+    def at_any_cost(self, target, starts):
+        self.asked.append(('at any cost', target, starts))
+        return Candidate(target, ALL, np.full(len(NAMES), 0.1), 0.5, 0.6, 9.0)
+
+    def refined(self, best):
+        return best
+
+
+@pytest.mark.parametrize(
+    ('reached', 'quick', 'helps', 'costs'),
+    [
+        ([(0.1, 0.8), (0.2, 0.4)], True, 0.4, False),
+        ([(0.1, 0.5)], False, 0.5, False),
+        ([(0.1, 0.51), (0.1, None)], False, 0.51, True),
+        ([(0.1, None)], False, 0.6, True),
+        ([(0.0, 0.3)], False, None, False),  # nothing is changed
+    ],
+)
+def test_remedies_against_the_others_follow_where_runs_are_quick(
+    reached, quick, helps, costs, short, monkeypatch
+):
+    made = type('Told', (OfRatios,), {'reached': reached})()
+    monkeypatch.setattr(search, 'Remedies', lambda *_: made)
+    monkeypatch.setattr(search, 'STARTS', 4)
+    monkeypatch.setattr(setting_of, 'MANY_STEPS', 150 if quick else 149)
+    told = []
+    found = propose(open_setting('rexrov', short), 'delta_pi.pitch', lambda *of: told.append(of))
+    others = [(3, 1), (7, 1)] if quick else []
+    assert made.asked == [
+        (PITCH, 4), *([('at any cost', PITCH, 4)] if costs else []), *others
+    ]  # fmt: skip
+    parts = 1 + len(others)
+    assert told == [*((done, parts) for done in range(parts)), (parts, parts)]
+    assert (found.best and found.best.ratio) == helps
+    assert [one.target for one in found.candidates] == [
+        *[PITCH] * (len(reached) + costs), *np.repeat([3, 7], len(reached) * quick),
+    ]  # fmt: skip
+
+
+def test_changes_that_make_it_worse_are_no_proposal(short, monkeypatch):
+    made = type('Told', (OfRatios,), {'reached': [(0.1, 1.0)]})()
+    made.at_any_cost = lambda *_: Candidate(PITCH, ALL, np.full(len(NAMES), 0.1), 0.5, 1.0, 1.0)
+    monkeypatch.setattr(search, 'Remedies', lambda *_: made)
+    assert propose(open_setting('rexrov', short), 'delta_pi.pitch').best is None
+
+
+def test_changes_that_halve_are_ranked_by_score_and_the_others_by_what_they_leave():
+    def one(ratio, score):
+        return Candidate(PITCH, ALL, np.zeros(len(NAMES)), 0.5, ratio, score)
+
+    ordered = [one(0.5, 1.0), one(0.1, 2.0), one(0.3, 3.0), one(0.51, 9.0), one(0.8, 0.5),
+               one(None, np.inf)]  # fmt: skip
+    ranks = [found.rank for found in ordered]
+    assert ranks == sorted(set(ranks))
+    failed = results._candidate(replace(ordered[-1], failure='it diverges'), False)
+    assert (failed['ratio'], failed['score'], failed['failure']) == (None, None, 'it diverges')
+    found = results._candidate(ordered[0], True)
+    assert (found['predicted'], found['ratio'], found['score']) == (0.5, 0.5, 1.0)
+    assert (found['failure'], found['proposed']) == (None, True)
+
+
+def test_a_change_that_cannot_be_run_says_why(remedies, monkeypatch):
+    for error in (ZeroDivisionError('it diverges'), InputError('v', 'M', 'a mass', 'none')):
+
+        def fail(*_, error=error):
+            raise error
+
+        monkeypatch.setattr(type(remedies.setting), 'simulated', fail)
+        objective = Objective(remedies.prediction, PITCH)
+        found = remedies._simulated(objective, ALL, remedies.setting.space.unchanged)
+        assert (found.failure, found.ratio, found.run) == (str(error), None, None)
+        assert remedies.refined(found) is found
+
+
 def test_a_part_that_is_held_is_not_changed(short, tmp_path):
     own = [('ballast.mass', 0.0, 0.0), ('disc.radius', 0.0, 0.0), ('shift.x', 0.0, 0.05)]
     result, _ = designed('rexrov', tmp_path, short, None, own)
@@ -315,6 +459,16 @@ def test_a_vehicle_that_rights_itself_less_is_warned_of(approved):
     assert 'tilts by' in tilts
     approved.add([falls, tilts])
     assert warnings_of(vehicle, upside) == ['the changed vehicle is statically unstable']
+    apart = replace(vehicle, r_G=np.array([0.1, -0.2, 0.3]), r_B=np.array([0.0, 0.1, -0.4]))
+    W, B = vehicle.weight, vehicle.buoyancy
+    rights = 0.3 * W + 0.4 * B
+    assert results.rest_of(apart) == {
+        'weight': W, 'buoyancy': B, 'weight_minus_buoyancy': W - B, 'r_G': [0.1, -0.2, 0.3],
+        'r_B': [0.0, 0.1, -0.4], 'metacentric_height': pytest.approx(0.7),
+        'stability': pytest.approx(rights), 'tilt_at_rest_deg': pytest.approx(
+            np.degrees(np.arctan(np.hypot(0.1 * W, -0.2 * W - 0.1 * B) / rights))),
+    }  # fmt: skip
+    assert results.rest_of(upside)['tilt_at_rest_deg'] is None
 
 
 def test_what_lies_on_a_bound_or_outside_the_hull_is_warned_of():
@@ -336,6 +490,11 @@ def test_what_lies_on_a_bound_or_outside_the_hull_is_warned_of():
             {'name': 'disc.y', 'value': 0.1, 'unit': 'm', 'at_bound': None}]  # fmt: skip
     assert 'disc.x = −1.135 m (lower)' in bound_warnings(rows)[0]
     assert bound_warnings(rows[1:]) == []
+    one = Parameter('shift.x', 'm', -1.0, 3.0, '')  # within 0.008 of an end
+    for value, side in ((2.993, 'upper'), (2.991, None), (-0.993, 'lower'), (-0.991, None)):
+        assert results._at_bound(one, value) == side
+    assert results._at_bound(replace(one, unit='deg'), 3.0) is None
+    assert results._at_bound(replace(one, upper=-1.0), -1.0) is None
 
 
 def test_what_grows_beside_the_target_is_named_however_small_its_share():
@@ -355,6 +514,16 @@ def test_what_grows_beside_the_target_is_named_however_small_its_share():
     assert found == {'delta_pi_max.heave': None, 'delta_pi_max.yaw': pytest.approx(284.0)}
     (text,) = side_effect_warnings(side_effects(rows, 'delta_pi.pitch'))
     assert '10.0 to 38.4 N m (+284 %)' in text
+    assert text.startswith('side effects above 10 %: delta_pi_max.heave from 0 to 3.00 N (new)')
+    many = [row(f'effort.max.{k}', 1.0, 2.0 + k) for k in range(8)]
+    found = side_effects(many, 'delta_pi.pitch')
+    assert [one['percent'] for one in found] == pytest.approx([100.0 * k for k in range(8, 0, -1)])
+    for count, end in ((6, 'effort.max.2 from 1.00 to 4.00 N m (+300 %)'), (7, ' and 1 other'),
+                       (8, ' and 2 others')):  # fmt: skip
+        (text,) = side_effect_warnings(found[:count])
+        assert text.endswith(end)
+        assert text.count('N m') == 6
+    assert side_effect_warnings([]) == []
 
 
 def test_a_change_in_words():

@@ -1,6 +1,7 @@
 """Sensitivity to the gains: known laws of the figures, every form of a gain, honest failures."""
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -122,7 +123,7 @@ def test_what_cannot_be_followed_is_named(monkeypatch, approved):
     assert [kpi.column for kpi in found.kpis] == ['effort.rms.heave']
 
 
-def test_diverging_loops_narrow_the_span_and_are_counted(monkeypatch, approved):
+def test_diverging_loops_narrow_the_span_and_are_counted(monkeypatch, tmp_path, approved):
     known(monkeypatch, limit=1.5, **LAWS)
     found = sensitivity(short(), 'gvc', count=32)
     assert found.span == pytest.approx(2.0**0.5)
@@ -133,6 +134,19 @@ def test_diverging_loops_narrow_the_span_and_are_counted(monkeypatch, approved):
     assert_allclose(column(surge, 'elasticity'), [-1, 0, 0, -1], atol=1e-9)
     text = ' '.join(s.text for s in sensitivity_sentences([found]))
     assert f'{found.failed[2.0]} rollouts failed' in text
+    path = write_sensitivities(tmp_path, [replace(found, failed={2.0: 7, 1.4: 2}, seed=5)])
+    rows = parquet.read_table(path).to_pylist()
+    assert {
+        tuple(row[key] for key in ('controller', 'law', 'method', 'count', 'rollouts',
+                                   'span_asked', 'diverged', 'seed')) for row in rows
+    } == {('gvc', 'gvc', 'sobol', 32, 32 * 6 + 1, 2.0, 9, 5)}  # fmt: skip
+    assert {row['span'] for row in rows} == {found.span}
+    (left_out,) = (row for row in rows if row['figure'] == NAMES[2].rpartition('.')[0]
+                   and row['dof'] == 'heave')  # fmt: skip
+    assert (left_out['gain'], left_out['ST'], left_out['unit']) == ('', None, 'm/s')
+    assert found.six('velocity_error.rms').tolist() == [
+        surge[0]['spread'], found.of('velocity_error.rms')['sway'][0]['spread'], 0, 0, 0, 0
+    ]  # fmt: skip
 
 
 def test_loops_that_always_diverge_are_a_refusal_with_its_reason(monkeypatch, tmp_path, approved):

@@ -1,5 +1,7 @@
 """Paired comparisons: ties, losers, and what Holm and Wilcoxon give by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers.tunings import GVC, SAME_CL, scenario
@@ -8,7 +10,7 @@ from scipy.stats import binomtest, rankdata
 from auv_analysis.studies.pairs import MOST, NEVER, holm, log_ratios, paired
 from auv_analysis.studies.tune.cost import Measures
 from auv_analysis.studies.tune.perturbations import Perturbations, Spread, monte_carlo
-from auv_analysis.studies.tune.results import COMPARED, compare
+from auv_analysis.studies.tune.results import COMPARED, _deviation, _distribution, compare
 
 
 def measures(values: np.ndarray) -> Measures:
@@ -100,6 +102,35 @@ def test_measure_that_no_loop_has_is_not_compared() -> None:
     short = measures([1.0, 2.0])._replace(late_error=np.full(2, np.nan))
     rows = compare({'a': short, 'b': short}, [('a', 'b')])
     assert [row.measure for row in rows] == [m for m in COMPARED if m != 'late_error']
+
+
+def test_a_difference_is_called_one_below_five_percent() -> None:
+    a, b = measures(np.linspace(2.0, 3.0, 20)), measures(np.ones(20))
+    row = compare({'a': a, 'b': b}, [('a', 'b')])[0]
+    for p, verdict in ((0.0499, 1), (0.05, 0)):
+        assert replace(row, p_holm=p).verdict == verdict
+        assert replace(row, p_holm=p, effect=-0.5).verdict == -verdict
+
+
+def test_quantiles_of_draws_put_what_diverged_or_never_settles_last() -> None:
+    values = [*np.arange(1.0, 18.0), np.nan, np.nan, np.nan]
+    draws = measures(np.random.default_rng(0).permutation(values))
+    settling = np.where(np.arange(20) < 5, np.inf, 2.0)
+    found = _distribution(draws._replace(settling=settling))
+    assert (found['diverged'], found['settled']) == (0.15, 0.75)
+    # the smallest value at or above which that part of the 19 steps between 20 draws lies
+    assert found['error'] == {'q05': 2.0, 'q25': 6.0, 'median': 11.0, 'q75': 16.0, 'q95': np.inf}
+    assert (found['settling']['q75'], found['settling']['q95']) == (np.inf, np.inf)
+    assert found['settling']['median'] == 2.0
+
+
+@pytest.mark.parametrize(
+    ('a', 'b', 'apart'),
+    [(2.0, 2.0, 0.0), (-4.0, -5.0, 0.2), (5.0, 4.0, 0.2), (np.nan, np.nan, 0.0),
+     (np.inf, np.inf, 0.0), (np.nan, 1.0, np.inf), (1.0, np.inf, np.inf), (0.0, 0.0, 0.0)],
+)  # fmt: skip
+def test_how_far_a_single_run_is_from_the_batch(a: float, b: float, apart: float) -> None:
+    assert _deviation(a, b) == pytest.approx(apart)
 
 
 def test_rounding_is_a_tie() -> None:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers import tunings
 from helpers.strategies import QUICK
 from helpers.tunings import GVC, SAME_CL, scenario
 from hypothesis import given
@@ -19,6 +20,7 @@ from auv_analysis.studies.tune.perturbations import (
 )
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import matrix6
+from auv_dynamics.vehicle import DOFS
 
 HERMAN = load_scenario('case1')
 REXROV = load_scenario('case1_rexrov')
@@ -73,6 +75,42 @@ def test_drawn_numbers_fill_their_spread_on_either_side() -> None:
     assert 1.35 < factors.max() <= 1.5
 
 
+def test_added_forces_and_currents_fill_what_they_may_be() -> None:
+    draws = [perturbed(REXROV, Spread(waves=0.04, current=0.3), 1, i) for i in range(60)]
+    waves = [of_kind(draw, 'harmonic')[0] for draw in draws]
+    assert {len(wave[dof]['terms']) for wave in waves for dof in DOFS} == {1}
+    terms = [[wave[dof]['terms'][0] for dof in DOFS] for wave in waves]
+    sizes, omegas, phases = (
+        np.array([[term[key] for term in row] for row in terms])
+        for key in ('amplitude', 'omega', 'phase')
+    )
+    sizes /= np.diagonal(REXROV.vehicle.M)
+    for found, low, high in ((sizes, 0.0, 0.04), (omegas, 0.3, 1.5), (phases, 0.0, 2 * np.pi)):
+        assert low <= found.min() < low + 0.05 * (high - low)
+        assert high - 0.05 * (high - low) < found.max() <= high
+        assert len(np.unique(found)) == found.size
+    velocity = np.array([of_kind(draw, 'current')[0]['velocity'] for draw in draws])
+    speed = np.linalg.norm(velocity, axis=1)
+    assert speed.min() < 0.05
+    assert 0.27 < speed.max() <= 0.3
+    assert not velocity[:, 2].any()
+    for way in (velocity[:, 0], velocity[:, 1]):
+        assert way.min() < -0.15
+        assert way.max() > 0.15
+
+
+def test_what_is_neither_a_harmonic_nor_the_papers_stays_as_it_is(tmp_path) -> None:
+    own = [{'kind': 'current', 'velocity': [0.2, -0.1, 0.0]}, tunings.WAVES]
+    base = scenario(tmp_path, {'gvc': GVC}, disturbance=own)
+    assert perturbed(base, NONE, 0, 0).data['disturbance'][0] == base.data['disturbance'][0]
+    found = perturbed(base, Spread(), 0, 0).data['disturbance']
+    assert found[0] == base.data['disturbance'][0]
+    assert [spec['kind'] for spec in found[1:]] == ['harmonic', 'model_error', 'harmonic',
+                                                    'current']  # fmt: skip
+    (term,) = found[1]['surge']['terms']
+    assert term['omega'] == 2.0
+
+
 def test_draw_depends_on_seed_and_index_alone() -> None:
     one = perturbed(REXROV, Spread(), 5, 3).data['disturbance']
     assert perturbed(REXROV, Spread(), 5, 3).data['disturbance'] == one
@@ -100,7 +138,10 @@ def test_every_controller_meets_the_same_draws(tmp_path) -> None:
     """Rows do not depend on which controllers are compared, nor on the order or the threads."""
     both = scenario(tmp_path, {'gvc': GVC, 'again': GVC, 'cl': SAME_CL | {'k_D': 300.0}})
     alone = changed_scenario(both, {'controllers': {'cl': both.controllers['cl']}})
-    found = monte_carlo(both, Perturbations(12, Spread(), 3), 'continuous', 2)
+    done: list[None] = []
+    asked = Perturbations(12, Spread(), 3)
+    found = monte_carlo(both, asked, 'continuous', 2, lambda: done.append(None))
+    assert len(done) == 12
     np.testing.assert_array_equal(found['gvc'], found['again'])
     np.testing.assert_array_equal(
         found['cl'], monte_carlo(alone, Perturbations(12, Spread(), 3), 'continuous', 1)['cl']
@@ -110,8 +151,11 @@ def test_every_controller_meets_the_same_draws(tmp_path) -> None:
 
 def test_spread_of_the_command_line() -> None:
     assert spread_of(['mass=0', 'waves=2.5']) == Spread(mass=0.0, waves=2.5)
-    assert 'inertia' not in applicable(Spread(), REXROV.vehicle)
-    assert applicable(Spread(), HERMAN.vehicle).keys() >= {'inertia', 'damping'}
+    every = {'mass', 'added_mass', 'damping', 'buoyancy', 'inertia', 'disturbance', 'waves',
+             'current'}  # fmt: skip
+    assert applicable(Spread(), REXROV.vehicle).keys() == every - {'inertia'}
+    assert applicable(Spread(), HERMAN.vehicle).keys() == every - {'mass', 'added_mass'}
+    assert applicable(Spread(waves=0.7), HERMAN.vehicle)['waves'] == 0.7
     for text, match in (
         ('size=1', 'with NAME one of mass, added_mass'), ('mass', 'from 0 up below 1, found'),
         ('mass=1', 'below 1, found 1'), ('current=-1', 'from 0 up, found -1'),

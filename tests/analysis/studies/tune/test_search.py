@@ -8,13 +8,15 @@ import pytest
 from helpers.tunings import DIAGONAL, GVC, scenario
 
 from auv_analysis import simulate
+from auv_analysis.simulation.simulate import DivergedError
+from auv_analysis.studies.tune import results as tuning
 from auv_analysis.studies.tune import search as searching
-from auv_analysis.studies.tune.cost import Measures, measures_of_run
+from auv_analysis.studies.tune.cost import Measures, measures_of_run, of_each
 from auv_analysis.studies.tune.gain_space import make_space
 from auv_analysis.studies.tune.perturbations import Perturbations, Spread, perturbed
-from auv_analysis.studies.tune.results import _evaluations, tune
+from auv_analysis.studies.tune.results import _checked, _evaluations, tune
 from auv_analysis.studies.tune.search import Goal, Request, TunedLaw, search, tuned
-from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 from auv_gvc_controller.control.gains import sampled_rate
 from auv_gvc_controller.laws.model import control_model
@@ -220,6 +222,41 @@ def test_an_open_loop_beside_the_reference_keeps_its_excitation(tmp_path) -> Non
     goal = Goal.of(request)
     effort = tuned(request, 'gvc', goal).best.measures.effort[0]
     assert effort == pytest.approx(goal.reference.effort[0], rel=1e-3), 'it starts at its gains'
+
+
+def test_single_runs_that_are_not_what_the_search_saw_end_a_tuning(tmp_path, monkeypatch) -> None:
+    wild = {'law': 'cl', 'k_D': 1e9, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
+    base = scenario(tmp_path, {'gvc': GVC, 'wild': wild}, duration=0.2)
+    request = Request(base, 'gvc', ('gvc',), 'effort', 'error', 1e-3, 'scalar', 'continuous', 0, 1)
+    nominal = of_each(base, 'continuous')
+    assert np.isnan(nominal['wild'].error[0])
+    told: list[object] = []
+
+    def progress(*about):
+        told.append(about)
+        return lambda: told.append('done')
+
+    largest, commands = _checked(base, request, nominal, progress)
+    assert largest < 1e-6
+    assert list(commands) == ['gvc'], 'what diverged has no largest command'
+    np.testing.assert_array_equal(commands['gvc'], np.abs(simulate(base, 'gvc').tau).max(axis=0))
+    assert told == [('checking against single runs', 2), 'done', 'done']
+
+    def off(run):
+        found = measures_of_run(run)
+        return found._replace(effort=found.effort * (1 + 2e-6), error=found.error * (1 + 1e-7))
+
+    monkeypatch.setattr(tuning, 'measures_of_run', off)
+    line = r'small, gvc: expected what the batch gave, found effort apart by 2e-06 \(relative\)'
+    with pytest.raises(FailedError, match=line):
+        _checked(base, request, nominal, progress)
+
+
+def test_a_reference_that_diverges_is_nothing_to_equal(tmp_path) -> None:
+    base = scenario(tmp_path, {'gvc': GVC | {'k_D': 1e9}}, duration=0.2)
+    request = Request(base, 'gvc', ('gvc',), 'effort', 'error', 1e-3, 'scalar', 'continuous', 0, 1)
+    with pytest.raises(DivergedError, match='small, gvc: the reference diverges'):
+        Goal.of(request)
 
 
 def test_a_reference_that_has_nothing_to_do_is_refused(tmp_path) -> None:

@@ -16,12 +16,15 @@ from auv_analysis.studies.excite import excite as searching
 from auv_analysis.studies.excite.drive import (
     Bounds,
     Family,
+    Motion,
     Request,
     motion_of,
     scenario_in_memory,
     scenario_of,
+    spec_of,
 )
-from auv_analysis.studies.excite.excite import _fleet, excite
+from auv_analysis.studies.excite.drive import recorded as run_of
+from auv_analysis.studies.excite.excite import _check, _fleet, excite, segments
 from auv_analysis.studies.excite.report import (
     print_results,
     results_of,
@@ -32,6 +35,7 @@ from auv_analysis.studies.excite.report import (
 from auv_analysis.studies.identify.identify import identify
 from auv_dynamics.files.errors import FailedError
 from auv_dynamics.files.shipped import shipped
+from auv_dynamics.plant.disturbance import Harmonics
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
 TANK = (12.0, 12.0, 6.0)
@@ -176,6 +180,97 @@ def test_it_tells_more_than_case_1(excited) -> None:
     assert np.median([mine[name] / case1[name] for name in case1]) < 0.5
     rows = results_of(excited).tables['intervals'].records()
     assert {row['name'] for row in rows if row['half_case1'] is None} >= set(mine) - set(case1)
+
+
+def test_shares_of_the_bounds_by_hand() -> None:
+    bounds = Bounds(np.array([10.0, 20.0, 0.0, 4.0, 5.0, 8.0]), 0.5, 2.0, 0.8,
+                    np.array([4.0, 10.0, np.inf]))  # fmt: skip
+    states = np.zeros((2, 1, 3, 13))
+    states[..., 3] = 1.0
+    states[0, 0, 1, :3] = (1.0, -4.0, 9.0)  # of 2 m, 5 m and no end
+    half = 0.3  # rad, of a turn about an axis in the plane of surge and sway
+    states[0, 0, 2, 3:7] = (np.cos(half), np.sin(half) * 0.6, np.sin(half) * 0.8, 0.0)
+    states[0, 0, 1, 7:10], states[0, 0, 2, 10:] = (0.1, 0.2, -0.2), (1.0, 0.5, -1.0)
+    commands = np.zeros((1, 2, 6))
+    commands[0, 1] = (-7.0, 2.0, 3.0, 1.0, 1.0, -1.0)
+    used = bounds.used(Motion(commands, states))
+    np.testing.assert_allclose(used[0, 0], [0.7, 0.6, 0.75, 0.75, 0.8])
+    np.testing.assert_allclose(used[1, 0], [0.7, 0.0, 0.0, 0.0, 0.0], atol=1e-7)
+    states[1, 0, 2] = np.nan
+    assert (bounds.used(Motion(commands, states))[1, 0, 1:] > 1.0).all(), 'not finite is far out'
+
+
+@pytest.mark.parametrize('closed', [False, True])
+def test_what_leaves_the_bounds_is_said(closed: bool) -> None:
+    request = request_of(closed=closed)
+    _check(request, np.array([[1.0, 0.5, 0.5, 0.5, 1.0], [0.2, 1.0, 0.5, 1.0, 0.1]]))
+    loop, other = ('closed', '') if closed else ('open', ', or --closed-loop')
+    for used, whose, share in (
+        ([[0.5, 0.5, 1.2, 0.5, 0.9], [0.5, 1.1, 1.3, 0.5, 0.5]], 'the vehicle', '1.3'),
+        ([[0.5, 0.5, 1.0, 0.5, 1.1], [0.5, 1.1, 1.25, 0.5, 0.5]], 'a vehicle near the prior',
+         '1.25'),
+    ):  # fmt: skip
+        with pytest.raises(FailedError) as left:
+            _check(request, np.array(used))
+        assert str(left.value) == (
+            f'{VEHICLE}: the {loop} loop leaves its bounds: {whose} takes {share} times the '
+            f'angular rate that is allowed: wider bounds or a smaller --spread{other}'
+        )
+
+
+def test_a_multisine_as_a_scenario_has_it() -> None:
+    terms = np.zeros((6, 3, 3))
+    terms[1, :2] = [[1.23456789, 0.5, 0.25], [2.0, 0.75, 3.0]]  # the third has no amplitude
+    terms[5, 0] = [0.5, 1.5, 0.0]
+    wave = Harmonics(np.array([0.0, -2.0, 3.0, 0.0, 0.0, 0.0]), tuple(terms))
+    first, second = ({'amplitude': 1.23457, 'omega': 0.5, 'phase': 0.25},
+                     {'amplitude': 2.0, 'omega': 0.75, 'phase': 3.0})  # fmt: skip
+    assert spec_of(wave) == {
+        'sway': {'offset': -2.0, 'terms': [first, second]}, 'heave': {'offset': 3.0},
+        'yaw': {'terms': [{'amplitude': 0.5, 'omega': 1.5, 'phase': 0.0}]},
+    }  # fmt: skip
+
+
+def test_what_a_request_assumes_stands_in_its_scenario() -> None:
+    request = request_of(lag=0.25, velocity_noise=0.01, attitude_noise=0.02, seed=5)
+    np.testing.assert_allclose(request.follow, np.full((1, 6), 1 - np.exp(-0.05 / 0.25)))
+    assert request.noise.tolist() == [0.01] * 6 + [0.02] * 3
+    assert request.steps == 800
+    wave = Harmonics(np.zeros(6), tuple(np.ones((6, 1, 3))))
+    data = scenario_of(request, wave)
+    assert data['sensors'] == {'velocity_noise': 0.01, 'attitude_noise': 0.02}
+    assert data['actuators'] == {'limit': request.bounds.wrench.tolist(), 'lag': 0.25}
+    assert [data[key] for key in ('name', 'vehicle', 'duration', 'step', 'seed')] == [
+        f'excite_{VEHICLE}', VEHICLE, 40.0, 0.05, 5
+    ]  # fmt: skip
+    quick = replace(request, lag=0.0)
+    assert (quick.follow == 1.0).all()
+    assert 'lag' not in scenario_of(quick, wave)['actuators']
+
+
+def test_segments_follow_one_another_and_carry_what_was_commanded_before() -> None:
+    request = request_of(step=0.5)
+    commands, states = np.arange(20.0)[:, None] * np.ones(6), np.arange(21.0)[:, None] * np.ones(13)
+    found = segments(request, commands, states, 2.0)
+    starts, before = (2, 6, 10, 14), 2  # 0.6 s of commands before each
+    assert [one.begin for one in found] == [0.5 * k for k in starts]
+    for one, k in zip(found, starts, strict=True):
+        assert one.before[:, 0].tolist() == list(range(k - before, k))
+        assert one.command[:, 0].tolist() == list(range(k, k + 4))
+        assert one.at.tolist() == [1, 2, 3, 4]
+        assert one.nu[:, 0].tolist() == one.q[:, 0].tolist() == list(range(k + 1, k + 5))
+        assert one.start[0] == k
+        assert [part.shape[-1] for part in (one.nu, one.q, one.start)] == [6, 4, 10]
+
+
+def test_a_run_that_diverges_is_recorded_as_not_finite() -> None:
+    scenario = load_scenario('case1')
+    gains = {'law': 'cl', 'k_D': 1e9, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
+    wild = replace(scenario, data=scenario.data | {'duration': 0.5, 'controllers': {'cl': gains}})
+    commands, states = run_of(wild, 'cl')
+    assert (commands.shape, states.shape) == ((50, 6), (51, 13))
+    assert np.isnan(commands).all()
+    assert np.isnan(states).all()
 
 
 def test_every_vehicle_around_the_prior_stays_inside(excited) -> None:

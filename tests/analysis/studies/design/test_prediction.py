@@ -1,6 +1,7 @@
 """What a run foretells of a changed vehicle: inverse dynamics, shares, scores and gradients."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from auv_analysis.studies.design.prediction import (
     Objective,
     Prediction,
     RecordedMotion,
+    _weights,
     accelerations,
     effort_of,
     shares_of,
@@ -167,6 +169,24 @@ def test_what_the_score_asks_for(prediction, change, better):
     found, usual = (float(objective.of(one)) for one in (same._replace(**values), same))
     assert (found < usual) == better
     assert found != usual
+
+
+def test_the_score_by_hand():
+    before = np.arange(1.0, 13.0) / 100
+    made = SimpleNamespace(before=SimpleNamespace(shares=before))
+    found = Metrics(np.array([0.5]), 2.0 * before[::-1], 2.5, 0.2, 0.7, True)
+    squares = before @ before
+    rest = 4.0 * (squares - before[8] ** 2) / (squares - before[3] ** 2 + 0.01 * squares)
+    burden = 0.3 * 0.2 + 0.01 * 0.7
+    for others in (0.1, 0.0):
+        one = Objective(made, 3) if others else Objective(made, 3, others)
+        assert one.of(found) == pytest.approx(0.25 + others * (rest + 2.5) + burden)
+    assert Objective(made, 3).of(found._replace(definite=False)) == 1e6
+
+
+def test_a_sample_stands_for_all_that_is_nearer_to_it():
+    found = _weights(np.array([0, 3, 9]), 10)  # up to halves of the way: 1.5 and 6
+    assert_allclose(found, [0.2, 0.45, 0.35])
 
 
 @QUICK

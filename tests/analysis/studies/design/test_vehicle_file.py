@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from auv_analysis.studies.design.change import NAMES, ChangeSpace, rounded, semi_axes
+from auv_analysis.studies.design.change import NAMES, ChangeSpace, _short, rounded, semi_axes
 from auv_analysis.studies.design.setting import changed_data, changed_text
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import parse_yaml, read_yaml
@@ -124,6 +124,57 @@ def test_the_size_of_a_vehicle_is_that_of_its_ellipsoid_and_without_a_tensor_of_
     assert_allclose(found['cg'], axes)
     assert_allclose(found['co'], axes)
     assert_allclose(4 / 3 * np.pi * found['M'] ** 3, data['hydrostatics']['volume'])
+
+
+def test_a_body_without_a_height_has_a_twentieth_of_its_length():
+    data = read_yaml(shipped('vehicles', 'rexrov'), 'vehicle')
+    mass, axes = data['rigid_body']['mass'], np.array([1.2, 0.7, 0.001])
+    tensor = mass / 5 * np.diag((axes**2).sum() - axes**2)
+    data['rigid_body']['inertia'] = tensor.tolist()
+    found, _ = semi_axes(vehicle_from_dict(data, 'x'), data)
+    assert_allclose(found, [1.2, 0.7, 0.06])
+
+
+@pytest.mark.parametrize(
+    ('bound', 'short'),
+    [(0.123456, 0.1234), (-0.123456, -0.1234), (1239.9, 1239.0), (0.0, 0.0), (2e-5, 2e-5),
+     (-98765.0, -98760.0)],
+)  # fmt: skip
+def test_a_bound_is_cut_towards_zero_to_four_digits(bound, short):
+    assert _short(bound) == pytest.approx(short, rel=1e-12)
+
+
+def test_a_change_is_as_large_as_its_parts_are_near_their_bounds():
+    space = ChangeSpace.of(read_yaml(shipped('vehicles', 'bluerov2'), 'vehicle'), 'x')
+    lower, upper = space.bounds
+    places = [i for i, name in enumerate(NAMES) if i > 2 and name[-2:] in ('.x', '.y', '.z')]
+    middle = np.where(np.isin(np.arange(13), places), (lower + upper) / 2, 0.0)
+    assert space.size(middle) == pytest.approx(0.0)
+    for changes, size in (
+        ({'ballast.mass': 1.0}, 1.0), ({'ballast.mass': 0.5}, 0.5), ({'disc.radius': 1.0}, 1.0),
+        ({'disc.radius': 0.5}, 1 / 8), ({'shift.x': 1.0}, 1 / 3), ({'shift.y': 0.5}, 1 / 12),
+        ({'disc.azimuth': 1.0}, 0.0), ({'ballast.mass': 0.5, 'shift.x': 1.0}, 0.5 + 1 / 3),
+    ):  # fmt: skip
+        x = middle.copy()
+        for name, share in changes.items():
+            x[NAMES.index(name)] = share * upper[NAMES.index(name)]
+        assert space.size(x) == pytest.approx(size), changes
+    one = NAMES.index('disc.y')
+    x = middle.copy()
+    x[one] = upper[one]
+    half, reach = (upper[one] - lower[one]) / 2, max(-lower[one], upper[one])
+    assert space.size(x) == pytest.approx(0.2 * (half / reach) ** 2 / 6)
+    held = ChangeSpace.of(space.data, 'x', [('ballast.mass', 0.0, 0.0)])
+    assert held.size(middle) == pytest.approx(0.0)
+
+
+def test_where_hardly_anything_rights_a_vehicle_its_length_does():
+    data = read_yaml(shipped('vehicles', 'bluerov2'), 'vehicle')
+    data['rigid_body']['center_of_gravity'] = data['hydrostatics']['center_of_buoyancy'] = [0.0] * 3
+    space = ChangeSpace.of(data, 'x')
+    length = semi_axes(space.vehicle, data)[0].mean()
+    found = space.hydrostatic_penalty(change_at(space, shift_x=0.01))
+    assert found == pytest.approx((0.01 / (0.01 * length)) ** 2)
 
 
 def test_the_stability_that_must_be_left_is_left():

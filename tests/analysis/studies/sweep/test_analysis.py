@@ -20,6 +20,7 @@ from auv_analysis.studies.sweep.quantiles import (
     thinned,
     varying,
 )
+from auv_dynamics.vehicle import DOFS
 
 
 def test_figures_that_never_differ_are_named_not_analysed(results: Analysis) -> None:
@@ -151,7 +152,7 @@ def test_quantiles_are_values_and_a_drawn_distribution_keeps_them(values) -> Non
     assert set(at) <= set(values)
     assert np.mean(values <= at[1]) >= 0.5
     few = thinned(values)
-    assert len(few) <= max(len(values), 201)
+    assert len(few) == min(len(values), 201)
     assert set(few) <= set(values)
     for value in at:
         assert np.mean(few <= value) == pytest.approx(np.mean(values <= value), abs=0.006)
@@ -207,6 +208,29 @@ def test_ranks_are_those_of_scipy_and_equal_ones_share_theirs(unit: str) -> None
 )
 def test_whether_a_figure_varies(values: list[list[float]], unit: str, found: bool) -> None:
     assert varying([np.array(part) for part in values], unit) is found
+
+
+def test_what_some_rows_do_not_have_is_judged_by_the_others(tmp_path) -> None:
+    def partly(controller, values, index):
+        there = np.where(index % 3, values[K_D] ** 2, np.nan)
+        return {f'velocity_error.max_after_2s.{dof}': there for dof in DOFS[:3]}
+
+    found = analysed(open_sweep(make_sweep(tmp_path, SIMPLE, partly, range(6))))
+    name = 'overall.velocity_error.max_after_2s.linear'
+    (row,) = rows(found, 'influence', figure=name, controller='gvc', path=K_D)
+    assert row['spearman'] == pytest.approx(1.0)
+    (other,) = rows(found, 'influence', figure=name, controller='gvc', path=DAMPING)
+    mine = found.rows_of('gvc')[~np.isnan(found.values[name][found.rows_of('gvc')])]
+    damping = next(factor for factor in found.factors if factor.path == DAMPING)
+    assert other['spearman'] == pytest.approx(
+        spearmanr(damping.numbers[mine], found.values[name][mine]).statistic
+    )
+    (word,) = rows(found, 'influence', figure=name, controller='gvc', path='integrator')
+    assert word['spearman'] is None
+    (pair,) = rows(found, 'paired', figure=name)
+    assert pair['rollouts'] == 200
+    cells = rows(found, 'together', figure=name, controller='cl')
+    assert (sum(c['rows'] for c in cells), sum(c['known'] for c in cells)) == (300, 200)
 
 
 def test_rows_that_failed_have_no_say(tmp_path) -> None:

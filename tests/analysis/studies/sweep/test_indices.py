@@ -153,6 +153,19 @@ def test_values_of_another_design_are_not_taken_for_it(tmp_path: Path, approved)
     approved.add(notes)
 
 
+def test_a_design_of_words_and_whole_numbers_is_known_again(tmp_path: Path) -> None:
+    words = '      integrator: {choice: [ode5, rk4]}\n      setpoint.heave.offset: {integers: '
+    text = MORRIS.replace('    count: 12', f'{words}{{from: 1, to: 3}}}}\n    count: 12')
+    out = make_sweep(tmp_path, text, linear)
+    (found,), notes = designed(open_sweep(out))
+    assert (found.paths[3:], notes) == (['integrator', 'setpoint.heave.offset'], [])
+    assert (found.step, len(found.positions)) == (6, 72)
+    manifest = (out / 'sweep.json').read_text()
+    (out / 'sweep.json').write_text(manifest.replace('"ode5",\n', '"other",\n'))
+    found, (note,) = designed(open_sweep(out))
+    assert (found, 'is another' in note) == ([], True)
+
+
 def test_many_other_combinations_are_said(tmp_path: Path, approved) -> None:
     many = "grid: {'initial.nu[0]': [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]}"
     text = SALTELLI.replace('grid: {integrator: [ode5, rk4]}', many)

@@ -1,5 +1,6 @@
 """The folder of a sweep: gone on with after a stop, refused where something has changed."""
 
+import hashlib
 import json
 import platform
 from importlib import metadata
@@ -174,6 +175,55 @@ def test_a_manifest_that_is_none_of_a_sweep_is_refused(text: str, files: Path) -
     with pytest.raises(InputError, match=expected):
         run(files)
     assert (files / 'out/sweep.json').read_text() == text
+
+
+OWN_LAW = """
+from typing import NamedTuple
+
+class Nothing(NamedTuple):
+    k: object
+    STATES = 0
+
+    @staticmethod
+    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        return (0.0,) * 6, (0.0,) * 6
+
+    @staticmethod
+    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        return ()
+"""
+
+
+def test_folder_is_refused_when_a_law_of_ones_own_is_edited(files: Path, monkeypatch) -> None:
+    monkeypatch.syspath_prepend(str(files))
+    source = files / 'law_that_is_edited.py'
+    source.write_text(OWN_LAW)
+    mine = "  mine: {law: 'law_that_is_edited:Nothing', k: 100.0}\n"
+    (files / 'scenario.yaml').write_text(SCENARIO.replace('  gvc:', f'{mine}  gvc:'))
+    grid = "vary: [{grid: {'controllers.mine.k': [50, 100.0]}}]"
+    for swept, laws in (('mine, gvc', {'mine'}), ('gvc, cl', set())):
+        (files / 'campaign.yaml').write_text(
+            f'name: x\nscenario: scenario.yaml\ncontrollers: [{swept}]\n'
+            + (grid if laws else grid.replace('mine', 'gvc').replace('.k', '.k_D'))
+            + '\n'
+        )
+        campaign, out = load_campaign(files / 'campaign.yaml'), files / swept[:3]
+        assert set(campaign.own_laws) == laws
+        with sweep_folder(out, campaign, overwrite=False):
+            kept = json.loads((out / 'sweep.json').read_text())['laws']
+        digest = hashlib.sha256(source.read_bytes()).hexdigest()
+        assert kept == dict.fromkeys(laws, digest[:16])
+        source.write_text(f'{OWN_LAW}# changed after {swept}\n')
+        if laws:
+            expected = 'laws.mine: expected the module of the law as when it was begun, .* edited'
+            with (
+                pytest.raises(InputError, match=expected),
+                sweep_folder(out, campaign, overwrite=False),
+            ):
+                pass
+        else:
+            with sweep_folder(out, campaign, overwrite=False) as folder:
+                assert not folder.new
 
 
 def test_folder_that_another_process_sweeps_into_is_refused(files: Path) -> None:

@@ -187,6 +187,7 @@ def test_grid_and_zip_give_what_is_listed() -> None:
     found = grid.at(np.arange(grid.size))
     rows = list(zip(*(list(found[path]) for path in axes), strict=True))
     assert rows == list(itertools.product(*axes.values()))
+    assert list(found) == list(axes), 'columns are in the order of the campaign'
     beside = make_group({'zip': {'a': [1, 2], 'b': [[3.0], [4.0]]}}, SEED, 0, 'file')
     assert beside.at(np.array([1, 0, 1]))['b'] == [[4.0], [3.0], [4.0]]
 

@@ -13,8 +13,10 @@ from helpers.tunings import GVC, SAME_CL, write
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.cli import main, tune
+from auv_analysis.metrics.quantities import COSTS
 from auv_analysis.studies.tune import search as searching
 from auv_analysis.studies.tune.cost import measures_of_run
+from auv_analysis.studies.tune.gain_space import STRUCTURES
 from auv_analysis.studies.tune.perturbations import Perturbations, Spread, monte_carlo
 from auv_analysis.studies.tune.report import FAIR
 
@@ -106,10 +108,21 @@ def _repeated(document: dict, folder: Path) -> None:
 
 def _searched(document: dict, folder: Path) -> None:
     table = pq.read_table(folder / 'search.parquet')
+    assert document['measures']['effort'] == {
+        'label': COSTS['effort'].label, 'unit': 'J/s²', 'text': COSTS['effort'].meaning
+    }  # fmt: skip
+    bounds = document['controllers']['cl_tuned']['searches'][0]['searched']
+    assert bounds['k_D'] == {'low': 0.05, 'high': 100.0, 'times_inertia': True}  # 1/step
+    assert bounds['Lambda'] == {'low': 0.01, 'high': 100.0, 'times_inertia': False}
     tuned = {n: e for n, e in document['controllers'].items() if e['tuned']}
     assert len(table) == sum(entry['evaluations'] for entry in tuned.values())
     rows = table.to_pylist()
     for name, entry in tuned.items():
+        assert (entry['structure'], entry['structure_means']) == ('mass', STRUCTURES['mass'])
+        (search,) = entry['searches']
+        assert [search[key] for key in ('structure', 'reached', 'evaluations', 'measures')] == [
+            entry[key] for key in ('structure', 'reached', 'evaluations', 'measures')
+        ]
         mine = [r for r in rows if r['controller'] == name and r['allowed'] and not r['diverged']
                 and r['stage'] != 'gradient']  # fmt: skip
         base = document['controllers']['gvc']['measures']['effort']
@@ -120,6 +133,8 @@ def _searched(document: dict, folder: Path) -> None:
 
 
 def _perturbed(document: dict, folder: Path) -> None:
+    assert document['monte_carlo']['samples'] == 12
+    assert document['monte_carlo']['spread']['waves'] == 0.05
     draws = pq.read_table(folder / 'monte_carlo.parquet').to_pandas()
     assert draws.groupby('controller')['draw'].apply(list).map(len).tolist() == [12] * 4
     for name, entry in document['monte_carlo']['controllers'].items():

@@ -371,14 +371,14 @@ def test_changes_that_halve_are_ranked_by_score_and_the_others_by_what_they_leav
     def one(ratio, score):
         return Candidate(PITCH, ALL, np.zeros(len(NAMES)), 0.5, ratio, score)
 
-    ordered = [one(0.5, 1.0), one(0.1, 2.0), one(0.3, 3.0), one(0.51, 9.0), one(0.8, 0.5),
+    ordered = [one(0.1, 2.0), one(0.5, 2.5), one(0.3, 3.0), one(0.51, 9.0), one(0.8, 0.5),
                one(None, np.inf)]  # fmt: skip
     ranks = [found.rank for found in ordered]
     assert ranks == sorted(set(ranks))
     failed = results._candidate(replace(ordered[-1], failure='it diverges'), False)
     assert (failed['ratio'], failed['score'], failed['failure']) == (None, None, 'it diverges')
     found = results._candidate(ordered[0], True)
-    assert (found['predicted'], found['ratio'], found['score']) == (0.5, 0.5, 1.0)
+    assert (found['predicted'], found['ratio'], found['score']) == (0.5, 0.1, 2.0)
     assert (found['failure'], found['proposed']) == (None, True)
 
 

@@ -159,11 +159,10 @@ def test_a_change_is_as_large_as_its_parts_are_near_their_bounds():
         for name, share in changes.items():
             x[NAMES.index(name)] = share * upper[NAMES.index(name)]
         assert space.size(x) == pytest.approx(size), changes
-    one = NAMES.index('disc.y')
+    aside = ChangeSpace.of(space.data, 'x', [('disc.y', -0.3, 0.1)])
     x = middle.copy()
-    x[one] = upper[one]
-    half, reach = (upper[one] - lower[one]) / 2, max(-lower[one], upper[one])
-    assert space.size(x) == pytest.approx(0.2 * (half / reach) ** 2 / 6)
+    x[NAMES.index('disc.y')] = 0.1  # 0.2 m from the middle, of 0.3 m at most
+    assert aside.size(x) == pytest.approx(0.2 * (2 / 3) ** 2 / 6)
     held = ChangeSpace.of(space.data, 'x', [('ballast.mass', 0.0, 0.0)])
     assert held.size(middle) == pytest.approx(0.0)
 

@@ -250,9 +250,9 @@ def test_what_a_request_assumes_stands_in_its_scenario() -> None:
 
 def test_segments_follow_one_another_and_carry_what_was_commanded_before() -> None:
     request = request_of(step=0.5)
-    commands, states = np.arange(20.0)[:, None] * np.ones(6), np.arange(21.0)[:, None] * np.ones(13)
+    commands, states = np.arange(22.0)[:, None] * np.ones(6), np.arange(23.0)[:, None] * np.ones(13)
     found = segments(request, commands, states, 2.0)
-    starts, before = (2, 6, 10, 14), 2  # 0.6 s of commands before each
+    starts, before = (2, 6, 10, 14, 18), 2  # 0.6 s of commands before each
     assert [one.begin for one in found] == [0.5 * k for k in starts]
     for one, k in zip(found, starts, strict=True):
         assert one.before[:, 0].tolist() == list(range(k - before, k))

@@ -30,7 +30,7 @@ def test_names_are_short_where_that_is_enough() -> None:
 
 
 def test_twelve_numbers_are_groups_and_more_are_bins_of_as_many_rows() -> None:
-    numbers = np.repeat(np.arange(12.0), 100)[::-1]
+    numbers = np.tile(np.arange(12.0)[::-1], 100)
     codes, edges, binned = _groups(numbers)
     assert (codes.tolist(), binned) == (numbers.tolist(), False)
     assert edges.tolist() == [[k, k] for k in range(12)]

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from helpers.made_sweeps import make_sweep
 
+from auv_analysis.metrics.measures import BY_NAME
 from auv_analysis.studies.sweep.analysis import analysed
 from auv_analysis.studies.sweep.dataset import open_sweep
 from auv_analysis.studies.sweep.indices import designed
+from auv_analysis.studies.sweep.indices import indices as indices_of
 from auv_dynamics.vehicle import DOFS
 
 ENERGY = 'kinetic_energy.mean'
@@ -131,6 +133,16 @@ def test_morris_leaves_out_the_trajectory_of_a_failed_row(tmp_path: Path) -> Non
         assert found[path]['points'] == 11
         assert found[path]['mu'] == pytest.approx(slope)
         assert found[path]['sigma'] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize('figure', [0.0, -3.0])
+def test_a_figure_that_is_the_same_everywhere_has_no_indices(tmp_path: Path, figure: float) -> None:
+    sweep = open_sweep(make_sweep(tmp_path, MORRIS, linear))
+    ((found,), _), measure = designed(sweep), BY_NAME[ENERGY]
+    values = np.full(sweep.rows, figure)
+    assert list(indices_of(sweep, found, values, measure)) == []
+    values[5] += 1.0
+    assert len(list(indices_of(sweep, found, values, measure))) == 3
 
 
 @pytest.mark.parametrize('count', [7, 8])

@@ -226,7 +226,8 @@ def test_an_open_loop_beside_the_reference_keeps_its_excitation(tmp_path) -> Non
 
 def test_single_runs_that_are_not_what_the_search_saw_end_a_tuning(tmp_path, monkeypatch) -> None:
     wild = {'law': 'cl', 'k_D': 1e9, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
-    base = scenario(tmp_path, {'gvc': GVC, 'wild': wild}, duration=0.2)
+    back = {'surge': {'offset': -0.5}}  # whose largest command is a negative one
+    base = scenario(tmp_path, {'gvc': GVC, 'wild': wild}, duration=0.2, setpoint=back)
     request = Request(base, 'gvc', ('gvc',), 'effort', 'error', 1e-3, 'scalar', 'continuous', 0, 1)
     nominal = of_each(base, 'continuous')
     assert np.isnan(nominal['wild'].error[0])

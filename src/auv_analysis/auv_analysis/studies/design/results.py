@@ -259,7 +259,7 @@ def _parameters(found: Proposal, x: np.ndarray) -> list[dict[str, Any]]:
 
 def _at_bound(one: Parameter, value: float) -> str | None:
     """Which bound of the search a value lies on; an angle comes round again."""
-    if one.unit == 'deg' or one.lower == one.upper:
+    if one.unit == 'deg':
         return None
     near = AT_BOUND * (one.upper - one.lower)
     return 'upper' if value > one.upper - near else 'lower' if value < one.lower + near else None

@@ -156,7 +156,8 @@ class Candidate:
         """The lowest is the best: of those that halve the coupling by score, else by ratio."""
         if self.ratio is None:
             return True, np.inf
-        return self.ratio > HALF, self.score if self.ratio <= HALF else self.ratio
+        halves = self.ratio <= HALF
+        return not halves, self.score if halves else self.ratio
 
 
 class Remedies:

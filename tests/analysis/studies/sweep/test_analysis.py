@@ -95,6 +95,8 @@ def test_two_paths_together(results: Analysis) -> None:
     first = {cell['value'] for cell in cells}
     assert len(first) <= 10
     assert all(cell['median'] is None or 1 <= cell['median'] <= 9 for cell in cells)
+    settled = {cell['median'] for cell in rows(results, 'together', figure=SETTLED)}
+    assert settled == {1.0, None}, 'half of a cell never settles: no time says when'
 
 
 def test_rows_that_settle_in_half(results: Analysis) -> None:

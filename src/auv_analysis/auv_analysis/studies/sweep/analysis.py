@@ -118,7 +118,7 @@ def along(figure: Ordered, codes: np.ndarray, factor: Factor, measure: Measure) 
     groups, rows = figure.groups(codes, count), np.bincount(codes, minlength=count)
     for i, (label, group) in enumerate(zip(factor.labels, groups, strict=True)):
         row: Row = {'path': factor.path, 'figure': measure.name, 'unit': measure.unit}
-        row |= {'group': i, 'value': label, 'middle': known(factor.middles[i])}
+        row |= {'group': i, 'value': label, 'middle': factor.middles[i]}
         ends = (None, None) if factor.edges is None else map(float, factor.edges[i])
         yield (
             row
@@ -242,7 +242,7 @@ def best(
         for rank, (place, given) in enumerate(zip(places, table, strict=True), start=1):
             row = {'by': by.name, 'controller': controller, 'rank': rank}
             row |= {'rollout': given.pop('index'), **given}
-            found.append(row | {m.name: known(figures[m.name][place]) for m in MEASURES})
+            found.append(row | {m.name: figures[m.name][place] for m in MEASURES})
     return found
 
 

@@ -119,7 +119,7 @@ class Sweep:
         """The parts as one; kept, so that what they say of themselves is read once."""
         import pyarrow.dataset as ds  # it asks for pandas, after which `arrow` looked
 
-        return ds.dataset([str(path) for path in self.parts], format='parquet')
+        return ds.dataset([str(path) for path in self.parts])
 
     def table(self, columns: list[str]) -> pa.Table:
         """Some columns of all rows, in the order of the parts."""

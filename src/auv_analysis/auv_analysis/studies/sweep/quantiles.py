@@ -86,11 +86,11 @@ def spread_of_sorted(values: np.ndarray, rows: int) -> Row:
     """The same of sorted values, of which the last ones may be infinite."""
     finite = values[: np.searchsorted(values, np.inf)]
     row: Row = {'rows': rows, 'known': len(finite)}
-    row |= {'smallest': known(finite[0]) if len(finite) else None}
+    row |= {'smallest': finite[0] if len(finite) else None}
     at = values[_places(len(values), LEVELS.values())] if len(values) else [np.nan] * len(LEVELS)
     row |= {name: known(value) for name, value in zip(LEVELS, at, strict=True)}
-    row |= {'largest': known(finite[-1]) if len(finite) else None}
-    return row | {'mean': known(finite.mean()) if len(finite) else None}
+    row |= {'largest': finite[-1] if len(finite) else None}
+    return row | {'mean': finite.mean() if len(finite) else None}
 
 
 def thinned(values: np.ndarray) -> np.ndarray:

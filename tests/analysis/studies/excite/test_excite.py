@@ -284,12 +284,20 @@ def test_every_vehicle_around_the_prior_stays_inside(excited) -> None:
     np.testing.assert_allclose(run.nu, excited.motion.states[0, 0, :, 7:], atol=1e-4)
 
 
-def test_a_spread_of_a_tenth_is_ten_percent_of_inertia_and_damping() -> None:
-    model, _ = _fleet(request_of(spread=0.1), np.random.default_rng(0), 2000)
+@pytest.mark.parametrize('vehicle', [VEHICLE, 'herman2018'])
+def test_a_spread_of_a_tenth_is_ten_percent_of_inertia_and_damping(vehicle: str) -> None:
+    request = request_of(vehicle, spread=0.1)
+    model, _ = _fleet(request, np.random.default_rng(0), 2000)
     for A in (model.M, model.D_linear, model.D_quadratic):
         some = A.reshape(-1, 6, 6)[:, range(6), range(6)]
         off = np.log(some[1:, some[0] > 0] / some[0, some[0] > 0])
         np.testing.assert_allclose(off.std(axis=0), 0.1, rtol=0.1)
+    prior, couple = request.vehicle.model.hydrostatics, request.vehicle.weight
+    prior, light = request.vehicle.model.hydrostatics, model.hydrostatics.reshape(-1, 4)
+    np.testing.assert_allclose(light[0], prior)
+    couple = np.abs(prior[1:]).max()  # its largest moment, for each of the three
+    expected = 0.1 * np.array([0.02 * request.vehicle.weight, couple, couple, couple])
+    np.testing.assert_allclose(light[1:].std(axis=0), expected, rtol=0.1)
 
 
 def test_no_two_sines_share_a_frequency_and_peaks_are_as_asked() -> None:

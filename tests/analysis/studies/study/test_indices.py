@@ -44,6 +44,13 @@ def test_a_linear_function_has_the_squares_of_its_slopes(slopes: list[float]) ->
     assert_allclose(found['slope'], slopes, atol=1e-9)
 
 
+def test_what_hardly_ever_answers_has_indices_of_zero_and_no_warning() -> None:
+    design = SensitivityPlan('sobol', ('a', 'b'), 8, 0)
+    row = np.arange(len(design.points))
+    y = np.where(row % 4 % 3, row, 0.0)  # always the same in the rows A and B
+    assert_array_equal(design.indices(y)['S1'], [0.0, 0.0])
+
+
 def test_morris_of_a_linear_function() -> None:
     design = SensitivityPlan('morris', ('a', 'b', 'c'), 8, 0)
     found = design.indices(design.points @ [1.0, -2.0, 0.0] + 5.0)

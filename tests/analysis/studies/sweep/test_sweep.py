@@ -2,19 +2,18 @@
 
 import math
 import os
-from concurrent.futures import (
-    CancelledError,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-)
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pyarrow as pa
 import pytest
 import yaml
+from helpers.patience import patience
 from helpers.sweeps import CAMPAIGN, ROLLOUTS, SCENARIO, Counting, parts, rows, run, write_files
 
 from auv_analysis import load_scenario, simulate, summarize
@@ -160,6 +159,33 @@ def test_what_stops_a_sweep_is_said_and_a_fault_of_the_program_is_none(
     with pytest.raises(SweepStoppedError if line else KeyError) as stopped:
         run(files)
     assert line is None or str(stopped.value) == line
+
+
+class Busy(ThreadPoolExecutor):
+    """Ctrl-C comes while the first block runs and the second waits, which is then let go."""
+
+    def __init__(self) -> None:
+        super().__init__(1)
+        self.begun, self.dropped, self.waits = Event(), Event(), []
+
+    def submit(self, function: Callable, /, *args: object) -> Future:
+        if len(self.waits) == 2:
+            assert self.begun.wait(patience(60.0))
+            raise KeyboardInterrupt
+        self.waits.append(super().submit(self._late, function, *args))
+        self.waits[-1].add_done_callback(lambda future: future.cancelled() and self.dropped.set())
+        return self.waits[-1]
+
+    def _late(self, function: Callable, *args: object) -> object:
+        self.begun.set()
+        self.dropped.wait(patience(60.0))
+        return function(*args)
+
+
+def test_an_interrupt_keeps_the_block_that_runs_and_drops_the_one_that_waits(files: Path) -> None:
+    with pytest.raises(SweepStoppedError, match='interrupted'):
+        run(files, Busy(), ahead=4)
+    assert list(parts(files / 'out')) == ['part-00000000.parquet']
 
 
 def test_progress_is_told_in_finished_rollouts(files: Path) -> None:

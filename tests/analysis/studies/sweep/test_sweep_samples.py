@@ -31,6 +31,11 @@ QUANTILES = [  # spec, what scipy.stats has for it
     ({'normal': {'mean': 3, 'std': 2}}, stats.norm(3, 2)),
     ({'normal': {'mean': 3, 'std': 2, 'from': 2, 'to': 8}}, stats.truncnorm(-0.5, 2.5, 3, 2)),
     ({'normal': {'mean': 3, 'std': 2, 'to': 2}}, stats.truncnorm(-np.inf, -0.5, 3, 2)),
+    # whose largest quantile would round to more than 0.7
+    (
+        {'normal': {'mean': 0.1, 'std': 2, 'from': -4.3, 'to': 0.7}},
+        stats.truncnorm(-2.2, 0.3, 0.1, 2),
+    ),
     ({'normal': {'mean': 0, 'std': 1, 'from': 9, 'to': 10}}, stats.truncnorm(9, 10)),
     ({'normal': {'mean': 0, 'std': 1, 'from': -10, 'to': -9}}, stats.truncnorm(-10, -9)),
     ({'lognormal': {'median': 4, 'sigma': 0.3}}, stats.lognorm(0.3, scale=4)),

@@ -79,6 +79,10 @@ def test_the_largest_coupling_is_halved_and_a_fresh_run_says_so(name, tmp_path):
     assert first['share']['before'] == max(row['share']['before'] for row in document['ranking'])
     row = by_name(document)['delta_pi_max.pitch']
     assert row['after'] <= 0.5 * row['before']
+    assert first['largest'] == pytest.approx({key: row[key] for key in ('before', 'after')})
+    assert first['share']['after'] < first['share']['before']
+    ranked = {one['coupling'].replace('.', '_max.') for one in document['ranking']}
+    assert ranked == {name for name in by_name(document) if name.startswith('delta_')}
     assert document['halved'] is True
 
     scenario = load_scenario(out / 'scenario.yaml')
@@ -198,6 +202,11 @@ def written(tmp_path, laws=(), **changes):
 )
 def test_a_design_is_judged_by_the_first_gvc_or_the_first_there_is(laws, judged, tmp_path):
     assert open_setting('rexrov', written(tmp_path, laws)).controller == judged
+
+
+def test_a_scenario_without_a_set_point_is_refused_by_name(tmp_path):
+    with pytest.raises(InputError, match=r'mine\.yaml: setpoint: expected'):
+        open_setting('rexrov', written(tmp_path, setpoint=5))
 
 
 @pytest.mark.parametrize(('name', 'changed'), [('n' * 92, 'n' * 92), ('n' * 100, 'n' * 92)])

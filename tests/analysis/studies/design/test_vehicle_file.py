@@ -102,14 +102,24 @@ def test_only_what_changes_is_written_anew(form):
     data = in_form(read_yaml(shipped('vehicles', 'rexrov'), 'vehicle'), form)
     space = ChangeSpace.of(data, 'x')
     assert changed_data(space, space.unchanged) == data
+    assert changed_data(space, change_at(space, ballast_x=0.1, disc_azimuth=30.0)) == data
     shifted = changed_data(space, change_at(space, shift_x=0.1))
     assert shifted['rigid_body']['center_of_gravity'] == [0.1, 0.0, 0.0]
-    for key in ('hydrostatics', 'damping', 'environment'):
-        assert shifted[key] == data[key]
+    for key in ('hydrostatics', 'damping', 'environment', 'added_mass'):
+        assert shifted.get(key) == data.get(key)
     assert shifted['rigid_body'].get('inertia') == data['rigid_body'].get('inertia') or form == 'co'
     dense = changed_data(space, change_at(space, disc_radius=0.2, disc_x=-1.0))
     assert dense['rigid_body'] == data['rigid_body']
     assert np.shape(dense['damping']['quadratic']) == (6,)
+
+
+def test_a_tensor_about_the_centre_of_gravity_moves_with_it_without_rounding():
+    data = read_yaml(shipped('vehicles', 'rexrov'), 'vehicle')
+    data['rigid_body']['inertia'] = np.diag([500.0, 600.0, 700.0]).tolist()
+    space = ChangeSpace.of(data, 'x')
+    x = change_at(space, shift_x=0.011, shift_y=0.022, shift_z=0.044)
+    assert (space.mass * x[:3] / space.mass != x[:3]).sum() > 1, 'the centre itself is rounded'
+    assert changed_data(space, x)['rigid_body']['inertia'] == data['rigid_body']['inertia']
 
 
 def test_the_size_of_a_vehicle_is_that_of_its_ellipsoid_and_without_a_tensor_of_its_sphere():

@@ -223,6 +223,15 @@ def test_open_loop_rates(name):
     assert min(found['linear_symmetric_eigenvalues']) >= -1e-12
 
 
+def test_the_symmetric_part_of_a_damping_that_is_not_symmetric(written):
+    D = np.diag([1.0, 5.0, 2.0, 9.0, 8.0, 5.0])
+    D[1, 5] = 4.0  # half of it on either side: 5 - 2 and 5 + 2
+    data = file_of('bluerov2_heavy')
+    data['damping']['linear'] = D.tolist()
+    found = check_vehicle(written(data))['damping']['linear_symmetric_eigenvalues']
+    assert found == pytest.approx([1.0, 2.0, 3.0, 7.0, 8.0, 9.0])
+
+
 def test_time_constants_that_can_be_read_off():
     by_name = {}
     for name in ('girona500', 'lauv', 'lrauv_tethys'):

@@ -145,6 +145,17 @@ def test_a_body_without_a_height_has_a_twentieth_of_its_length():
     assert_allclose(found, [1.2, 0.7, 0.06])
 
 
+def test_a_disc_is_no_larger_than_the_vehicle_and_what_turns_over_shall_not_rise():
+    data = read_yaml(shipped('vehicles', 'rexrov'), 'vehicle')
+    data['added_mass'] = [1e7, 1e7, 1e7, 1e3, 1e3, 1e3]
+    data['rigid_body']['center_of_gravity'] = [0.0, 0.0, -1.0]
+    space = ChangeSpace.of(data, 'x')
+    found = {one.name: one for one in space.parameters}
+    assert found['disc.radius'].upper == _short(semi_axes(space.vehicle, data)[0].mean())
+    assert (found['shift.z'].lower, found['shift.z'].upper > 0.0) == (0.0, True)
+    assert found['shift.z'].reason.endswith('upwards: no less stable')
+
+
 @pytest.mark.parametrize(
     ('bound', 'short'),
     [(0.123456, 0.1234), (-0.123456, -0.1234), (1239.9, 1239.0), (0.0, 0.0), (2e-5, 2e-5),

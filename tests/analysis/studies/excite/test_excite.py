@@ -271,6 +271,22 @@ def test_a_run_that_diverges_is_recorded_as_not_finite() -> None:
     assert (commands.shape, states.shape) == ((50, 6), (51, 13))
     assert np.isnan(commands).all()
     assert np.isnan(states).all()
+    tame = replace(scenario, data=scenario.data | {'duration': 0.5})
+    run, (commands, states) = simulate(tame, 'cl', 'zoh'), run_of(tame, 'cl')
+    np.testing.assert_array_equal(commands, run.tau[:50])
+    np.testing.assert_array_equal(states[:, :3], run.eta[:, :3])
+    np.testing.assert_array_equal(states[:, 7:], run.nu)
+
+
+def test_an_axis_that_hardly_holds_the_vehicle_has_no_peak() -> None:
+    request = request_of('herman2018', duration=2.0)  # which is lighter by 1079 N
+    family = Family.of(request, np.random.default_rng(0))
+    assert (family.most[2], 2 in family.driven) == (0.0, False)
+
+
+@pytest.mark.parametrize(('duration', 'length'), [(20.0, 19.4 / 4), (1e4, searching.LONG)])
+def test_of_a_short_recording_there_are_four_segments(duration: float, length: float) -> None:
+    assert searching._usual(request_of(duration=duration)) == pytest.approx(length)
 
 
 def test_every_vehicle_around_the_prior_stays_inside(excited) -> None:

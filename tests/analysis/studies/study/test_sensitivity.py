@@ -290,6 +290,8 @@ def test_what_is_small_throughout_its_kind_is_no_rounding():
     values = 1e-12 * np.linspace(1.0, 2.0, 9)
     found = {f'effort.max.{dof}': values for dof in DOFS}
     assert _reason(Kpi('effort.max', 'surge'), found) == ''
+    found['effort.max.heave'] = np.full(9, np.nan)  # does not exist, and is none of the largest
+    assert _reason(Kpi('effort.max', 'surge'), found) == ''
     found['effort.max.sway'] = np.ones(9)
     assert _reason(Kpi('effort.max', 'surge'), found).startswith('rounding')
     assert _reason(Kpi('effort.max', 'yaw'), found) == '', 'of the other half'

@@ -253,6 +253,12 @@ def test_single_runs_that_are_not_what_the_search_saw_end_a_tuning(tmp_path, mon
         _checked(base, request, nominal, progress)
 
 
+def test_a_name_that_is_taken_is_made_longer_until_it_is_free() -> None:
+    taken = SimpleNamespace(controllers=['cl', 'cl_tuned', 'cl_tuned_again'])
+    assert tuning._free('cl_tuned', taken) == 'cl_tuned_again_again'
+    assert tuning._free('gvc_tuned', taken) == 'gvc_tuned'
+
+
 def test_a_reference_that_diverges_is_nothing_to_equal(tmp_path) -> None:
     base = scenario(tmp_path, {'gvc': GVC | {'k_D': 1e9}}, duration=0.2)
     request = Request(base, 'gvc', ('gvc',), 'effort', 'error', 1e-3, 'scalar', 'continuous', 0, 1)

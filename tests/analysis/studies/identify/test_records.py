@@ -1,7 +1,9 @@
 """Recordings that are short, slow, or in part no measurement, become records or one line."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,16 +19,18 @@ from auv_analysis.studies.identify.identify import (
     _noise,
     _still,
     _trusting,
+    _with_best_delay,
     as_filed,
     check_motion,
     compared,
     identify,
     split,
 )
-from auv_analysis.studies.identify.output_error import delayed, on_steps
-from auv_analysis.studies.identify.prediction import held_of, predict
+from auv_analysis.studies.identify.output_error import _lagged, delayed, on_steps
+from auv_analysis.studies.identify.prediction import Prediction, held_of, predict, sizes
 from auv_analysis.studies.identify.record import (
     Record,
+    described,
     of_tracks,
     rotated,
     segments_of,
@@ -70,14 +74,70 @@ def test_four_equal_records_leave_no_empty_one(duration):
     assert [len(one.command) for one in held] == [round(100 * duration)]
 
 
+def test_what_is_held_out_begins_where_the_share_does():
+    """The last 30 % of 4 s and of 6 s that begin at 10 s."""
+    one, other = record(4.0), record(6.0)
+    other = replace(
+        other, start=10.0, attitude_t=other.attitude_t + 10.0, velocity_t=other.velocity_t + 10.0
+    )
+    training, held = split([one, other], 0.3)
+    found = [(part.start, part.end) for part in (*training, *held)]
+    assert_allclose(found, [(0.0, 4.0), (10.0, 13.0), (13.0, 16.0)])
+    assert_array_equal(held[0].command, other.command[300:])
+
+
 def test_nothing_to_learn_from_is_told():
     with pytest.raises(InputError, match=r'to learn from, found 0\.9 of 8 s'):
         split([record(8.0)], 0.9)
     with pytest.raises(InputError, match=r'--part: expected .* for a second and more'):
         parts([record(30.0)], [(10.0, 10.1)])
-    (part,), (whole,) = (parts([record(30.0)], [span]) for span in ((10.0, 11.0), (-5.0, 40.0)))
-    assert (part.start, part.end) == pytest.approx((10.0, 11.0))
-    assert (whole.start, whole.end) == pytest.approx((0.0, 30.0))
+    spans = (10.0, 11.0), (-5.0, 40.0), (25.0, np.inf)
+    found = [parts([record(30.0)], [span]) for span in spans]
+    assert_allclose([(one.start, one.end) for (one,) in found], [(10, 11), (0, 30), (25, 30)])
+    later = replace(record(20.0), start=40.0)
+    later = replace(later, attitude_t=later.attitude_t + 40.0, velocity_t=later.velocity_t + 40.0)
+    found = parts([record(30.0), later], [(41.0, 43.0), (28.0, 45.0)])
+    assert_allclose([(one.start, one.end) for one in found], [(28, 30), (41, 43), (40, 45)])
+
+
+def test_a_record_begins_where_all_signals_have_and_ends_where_one_does():
+    """Commands at 50 Hz, velocities at 25 Hz and attitudes at 10 Hz, none at the same time."""
+    t = {'pose': 1.0 + 0.1 * np.arange(31), 'twist': 1.2 + 0.04 * np.arange(70),
+         'wrench': 1.1 + 0.02 * np.arange(150)}  # fmt: skip
+    given = tracks({role: np.rint(1e9 * times).astype(np.int64) for role, times in t.items()})
+    given['pose'].rows[:, :3] = 7.0
+    for role, column in (('twist', 2), ('wrench', 4)):
+        given[role].rows[:, column] = t[role]
+    (found,) = of_tracks('x', given)  # of 1.2 to 3.96 s
+    assert (found.name, found.step, found.start) == ('x', 0.02, pytest.approx(0.2))
+    assert found.end == pytest.approx(2.96)
+    assert_allclose(found.command[:, 4], 1.2 + 0.02 * np.arange(138), atol=1e-9)
+    assert_allclose(found.velocity[:, 2], found.velocity_t + 1.0, atol=1e-9)
+    assert_allclose(found.velocity_t[[0, -1]], (0.2, 2.96))
+    assert_allclose(found.attitude_t, 0.2 + 0.1 * np.arange(28), atol=1e-9)
+    assert_array_equal(found.attitude, np.tile(AHEAD, (28, 1)))
+
+
+def test_what_a_recording_is_described_by():
+    t, signs = 0.02 * np.arange(101), np.where(np.arange(101) % 2, -1.0, 1.0)[:, None]
+    nu = signs * [1.0, 2.0, 3.0, np.nan, 5.0, 6.0]
+    attitude_t = 0.05 * np.arange(41)
+    wrench = signs[:60] * [60.0, 50.0, 40.0, 30.0, 20.0, 10.0]
+    one = Record('x', attitude_t, np.tile(AHEAD, (41, 1)), t, nu, 0.04, wrench, 0.5)
+    found = described(one)
+    assert found.pop('name') == 'x'
+    assert found.pop('velocity_rms') == pytest.approx([1.0, 2.0, 3.0, None, 5.0, 6.0])
+    assert found.pop('wrench_rms') == pytest.approx([60.0, 50.0, 40.0, 30.0, 20.0, 10.0])
+    assert found == pytest.approx({'duration': 2.4, 'velocity_rate': 50.0, 'attitude_rate': 20.0})
+
+
+def test_a_velocity_that_was_measured_once_is_that_throughout():
+    velocity = record(3.0).velocity
+    velocity[:, 4] = np.nan
+    velocity[120, 4] = 0.25
+    states = replace(record(3.0), velocity=velocity).states(np.array([0.5, 1.2, 2.5]))
+    assert_array_equal(states[:, 8], 0.25)
+    assert np.isfinite(states).all()
 
 
 def test_between_two_pauses_close_together_there_is_no_record():
@@ -103,9 +163,66 @@ def test_a_command_that_never_changes_tells_nothing(herman):
         check_motion([held], herman.noise())
 
 
-def test_a_segment_fits_into_a_record(herman):
+@pytest.mark.parametrize(('size', 'at_rest'), [(0.04, True), (0.06, False)])
+def test_a_vehicle_is_not_at_rest_where_one_recording_shows_it_move(size, at_rest):
+    """By more than five times the noise, in one velocity that another one lacks."""
+    blind, seeing = (
+        replace(one, velocity=1e-3 * one.velocity) for one in (record(9.0), record(9.0, seed=1))
+    )
+    blind.velocity[:, 2], seeing.velocity[:, 2] = np.nan, size * np.resize([1.0, -1.0], 901)
+    told = pytest.raises(InputError, match='at rest') if at_rest else nullcontext()
+    with told:
+        check_motion([blind, seeing], np.full(9, 0.01))
+
+
+def test_a_segment_fits_into_a_record(herman, monkeypatch):
+    """The longest one, and nothing is fitted before that is known."""
+    monkeypatch.setattr(identifying, '_search', None)
+    some = [herman.part(0.0, 3.0), herman.part(5.0, 13.0)]
     with pytest.raises(InputError, match=r'--segment: expected at most 7\.4 s, found 100 s'):
-        identify([herman.part(0.0, 8.0)], [], load_vehicle('herman2018'), Settings(segment=100.0))
+        identify(some, [], load_vehicle('herman2018'), Settings(segment=100.0))
+
+
+def test_the_first_fit_is_over_a_few_segments_evenly_chosen(herman, monkeypatch):
+    found = []
+
+    def enough(problem, *_):
+        found.extend(problem.segments)
+        raise StopIteration
+
+    monkeypatch.setattr(identifying, 'FIRST', 5)
+    monkeypatch.setattr(identifying, '_with_best_delay', enough)
+    with pytest.raises(StopIteration):
+        identify([herman.part(0.0, 20.0)], [], load_vehicle('herman2018'), Settings(('M',)))
+    apart = np.diff([one.begin for one in found])
+    assert len(found) == 5
+    assert apart.min() == pytest.approx(apart.max())
+    assert found[-1].begin > 15.0
+
+
+@pytest.mark.parametrize(('prior', 'begun'), [(0.0, 3), (0.08, 4)])
+def test_delays_are_tried_to_either_side_as_long_as_the_cost_rises_little(prior, begun):
+    """Lag and delay together stay as late as they were: only their shares are tried."""
+    costs, tried = (90.0, 60.0, 70.0, 50.0, 52.0, 95.0, 10.0), []
+
+    def fit(u, theta, starts=None, **_):
+        k = round(float(u.prior.delay) / 0.02)
+        assert starts is (None if k == begun else tried[0].starts)
+        found = u.coefficients(theta)
+        assert float(found.lag + found.delay) == pytest.approx(0.12)
+        tried.append(SimpleNamespace(unknowns=u, theta=theta, cost=costs[k], starts='starts'))
+        return tried[-1]
+
+    problem = SimpleNamespace(step=0.02, fit=fit)
+    u = unknowns(load_vehicle('herman2018'), ('lag', 'delay'), speeds=np.ones(6),
+                 wrenches=np.ones(6), lag=0.1).with_delay(prior)  # fmt: skip
+    fits = _with_best_delay(problem, u, np.zeros(1), 0.12, 30.0)
+    assert [one.cost for one in fits] == [50.0, 52.0, 60.0, 70.0, 90.0, 95.0]
+    tried.clear()
+    known = replace(u, is_delay_free=False).with_delay(0.06)
+    begun = 3
+    (alone,) = _with_best_delay(problem, known, np.zeros(1), 0.12, 30.0)
+    assert alone.cost == 50.0
 
 
 def test_many_short_stretches_are_enough(herman):
@@ -125,12 +242,17 @@ def test_segments_are_of_one_length(duration, count):
 def test_a_start_keeps_the_prior_of_what_is_not_linear(herman):
     """Gain, bias and current: the prior is theta = 0."""
     free = ('M', 'D_linear', 'gain', 'bias', 'current')
-    u = unknowns(load_vehicle('herman2018'), free, speeds=np.ones(6), wrenches=np.ones(6))
-    theta, _, _ = least_squares_start([herman], u)
+    u = unknowns(load_vehicle('herman2018'), free, speeds=np.ones(6), wrenches=np.ones(6), lag=0.05)
+    theta, late, _ = least_squares_start([herman], u)
+    assert late == 0.05
     kept = [k for k, one in enumerate(u.entries) if one.group in ('gain', 'bias', 'current')]
     assert len(kept) > 12
     assert_allclose(theta[kept], 0.0, atol=1e-12)
     assert np.abs(np.delete(theta, kept)).max() > 0
+    blind = replace(herman, velocity=np.where(np.arange(6) == 2, np.nan, herman.velocity))
+    theta, late, _ = least_squares_start([blind], u.with_delay(0.02))
+    assert not theta.any()
+    assert late == pytest.approx(0.07)
 
 
 @pytest.mark.parametrize('rate', [5.0, 9.5, 10.0, 10.4, 12.0])
@@ -236,16 +358,46 @@ def test_commands_are_delayed_by_any_number_of_steps(steps):
         assert_allclose(found[i, :, j], np.interp(k - steps, k, commands[i, :, j]), atol=1e-12)
 
 
-@pytest.mark.parametrize(('duration', 'apart'), [(30.0, 0.25), (195.0, 0.525)])
-def test_moments_of_prediction_are_apart_and_blocks_lie_in_one_recording(duration, apart):
+def test_a_lag_leaves_of_past_wrenches_what_it_makes_of_them_one_by_one():
+    draw = np.random.default_rng(4)
+    past, follow = draw.normal(size=(3, 7, 6)), draw.uniform(0.05, 0.9, (2, 6))
+    found = _lagged(past, follow)
+    for v, s in np.ndindex(2, 3):
+        tau = past[s, 0]
+        for asked in past[s]:
+            tau = tau + follow[v] * (asked - tau)
+        assert_allclose(found[v, s], tau)
+
+
+@pytest.mark.parametrize(
+    ('duration', 'apart', 'block'), [(3.0, 0.25, 2.25), (30.0, 0.25, 5.0), (195.0, 0.525, 5.0)]
+)
+def test_moments_of_prediction_are_apart_and_blocks_lie_in_one_recording(duration, apart, block):
     records = [record(duration, 0.025), record(15.0, 0.025)]
     held = held_of(records, 0.5)
     begins = [np.array([one.begin for one in some]) for some in held.segments]
     for one in begins:
         assert_allclose(np.diff(one), apart, atol=1e-9)
     first, second = np.split(held.blocks, [len(begins[0])])
-    assert np.all(np.diff(first) >= 0)
+    assert_array_equal(first, (begins[0] // block).astype(int))
+    assert_array_equal(second - second[0], (begins[1] // block).astype(int))
     assert second.min() > first.max()
+
+
+def test_a_stretch_shorter_than_the_horizons_is_left_out(herman):
+    vehicle, long, short = load_vehicle('herman2018'), herman.part(0.0, 12.0), herman.part(20, 21.5)
+    several, alone = (compared([long], held_of(some, HISTORY), vehicle)
+                      for some in ([long, short], [long]))  # fmt: skip
+    assert len(several) == len(alone) == 3 * 5
+    for one, other in zip(several, alone, strict=True):
+        assert one['predictor'] == other['predictor']
+        assert one['error'] == pytest.approx(other['error'])
+
+
+def test_an_error_counts_by_its_energy_and_as_a_thousand_at_most():
+    errors = np.array([[[1e9, 3.0, np.nan, 0.0, 0.0, -2.0]]])
+    found = sizes(Prediction('x', errors), np.diag([4.0, 8.0, 1.0, 1.0, 1.0, 5.0]))
+    assert_allclose(found, [[(4e6 + 72.0 + 20.0) / 4.0]])
 
 
 def test_a_prediction_is_compared_at_the_time_of_the_measurement():
@@ -274,13 +426,12 @@ def test_a_vehicle_as_filed_acts_behind_the_lag_and_the_delay_that_are_given(her
 
 
 def test_the_length_of_a_segment_is_as_asked_and_what_is_kept_counts(herman, monkeypatch):
-    monkeypatch.setattr(
-        identifying, '_of_still', lambda _, fit, every: 100.0 * np.eye(len(fit.theta))
-    )
+    for name, size in (('_between', 100.0), ('_bias', 200.0), ('_of_still', 400.0)):
+        monkeypatch.setattr(identifying, name, lambda *_, size=size: size * np.eye(6))
     few = Settings(('M.diagonal',), segment=2.0)
     found = identify([herman.part(0.0, 20.0)], [], load_vehicle('herman2018'), few)
     assert len(found.problem.segments[0].command) * found.problem.step == pytest.approx(2.0)
-    assert np.diag(found.covariance).min() >= 100.0
+    assert_allclose(np.diag(found.covariance), 700.0, atol=1.0)
 
 
 def test_what_hardly_moves_is_not_searched():

@@ -266,9 +266,9 @@ def as_filed(vehicle: Vehicle, lag: float = 0.0, delay: float = 0.0) -> tuple[Un
 def check_motion(records: Sequence[Record], noise: np.ndarray) -> None:
     """Refuse recordings of a vehicle at rest, or without a command."""
     name = records[0].name
-    moved = np.array([
-        np.sqrt(np.nanmean([np.nanvar(r.velocity[:, i]) for r in records]))
-        if any(r.known[i] for r in records) else 0.0 for i in range(6)
+    moved = np.sqrt([
+        np.mean([np.nanvar(r.velocity[:, i]) for r in records if r.known[i]] or [0.0])
+        for i in range(6)
     ])  # fmt: skip
     if np.all(moved < STILL * np.nan_to_num(noise[:6], nan=np.inf)):
         raise InputError(name, '', f'velocities that change by more than {STILL:g} times their '

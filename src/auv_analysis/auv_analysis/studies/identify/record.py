@@ -142,9 +142,9 @@ def continuous(q: np.ndarray) -> np.ndarray:
 
 def smoothed(t: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Values (m, k) of local polynomials through (n, k) at rising times, at other times."""
-    count = int(np.clip(SMOOTHING / max(np.median(np.diff(t)), 1e-9), SMALLEST, len(t)))
     if len(t) < SMALLEST:
         return np.stack([np.interp(at, t, column) for column in rows.T], axis=1)
+    count = int(np.clip(SMOOTHING / max(np.median(np.diff(t)), 1e-9), SMALLEST, len(t)))
     found = np.empty((len(at), rows.shape[1]))
     for here, near in windows(t, at, count):
         (w,) = weights(t, at[here], near, ORDER, rate=False)

@@ -1,6 +1,5 @@
 """Case 1 of the paper on another vehicle, as a scenario."""
 
-import copy
 import re
 from pathlib import Path
 from typing import Any
@@ -62,7 +61,7 @@ def scaled_case1(vehicle: str | Path) -> dict[str, Any]:
     InputError : naming file, key, expected and found
 
     """
-    scenario = copy.deepcopy(read_yaml(shipped('scenarios', 'case1'), 'scenario'))
+    scenario = read_yaml(shipped('scenarios', 'case1'), 'scenario')
     loaded = load_vehicle(vehicle)
     scenario['name'] = f'case1_{UNFIT.sub("_", loaded.name)[:LONGEST]}'
     bare = shipped('vehicles', vehicle) != Path(vehicle)

@@ -22,7 +22,7 @@ from auv_analysis.report.results import Results
 from auv_analysis.studies.identify import identify, prediction
 from auv_analysis.studies.identify.bags import read_records
 from auv_analysis.studies.identify.vehicle_text import write_vehicle
-from auv_dynamics.files.errors import FailedError
+from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
@@ -176,6 +176,13 @@ def test_the_wrench_that_acted_takes_the_place_of_the_command_and_the_truth_that
     np.testing.assert_allclose(acted.command, 0.5 * asked.command, atol=1e-9)
     assert np.abs(asked.command).max() > 1.0
     np.testing.assert_allclose(acted.velocity, run.nu, atol=1e-9)
+    messages = simple(seen, Maker(), '/a/odom', '/wrench', frames)
+    messages += simple(truth, Maker(), '/b/odom', '/thrust', frames)
+    said = 'odometry: expected one topic odom, or .*, found /a/odom, /b/odom'
+    with pytest.raises(InputError, match=said):
+        read_records(
+            write(tmp_path / 'two', messages, Maker()), vehicle, None, applied=False, notes=[]
+        )
 
 
 def test_a_vehicle_that_no_command_takes_gives_no_file(tmp_path):

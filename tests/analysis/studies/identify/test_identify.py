@@ -136,6 +136,24 @@ def test_a_wrench_in_another_unit_is_told_with_its_factor(value, said):
     assert said in _scale(SimpleNamespace(coefficients=lambda: rows))[0]
 
 
+@pytest.mark.parametrize(('times', 'known', 'said'), [
+    (3.5, 6, '(M.heave.heave 3.5 times the prior): another vehicle'), (2.5, 6, ''),
+    (0.25, 6, '(M.heave.heave 0.25 times the prior): another vehicle'), (0.4, 6, ''),
+    (9.0, 1, ''),
+])  # fmt: skip
+def test_an_axis_that_is_unlike_the_others_is_told(times, known, said):
+    """More than three times either way; of one axis alone nothing can be said."""
+    rows = [
+        {'name': f'M.{dof}.{dof}', 'prior': 10.0, 'value': 10.0 * (times if i == 0 else 1.0),
+         'status': 'identified' if i < known else 'prior'}
+        for i, dof in enumerate(('heave', 'surge', 'sway', 'roll', 'pitch', 'yaw'))
+    ]  # fmt: skip
+    vehicle = SimpleNamespace(M_RB=None)
+    found = _scale(SimpleNamespace(vehicle=vehicle, coefficients=lambda: rows))
+    assert len(found) == bool(said)
+    assert said in ''.join(found)
+
+
 @pytest.mark.parametrize(('low', 'told'), [(0.9, False), (1.1, True)])
 def test_a_model_that_predicts_worse_than_standing_still_is_told(low, told):
     """At horizons of half a second and more, all of them."""
@@ -319,10 +337,19 @@ def test_damping_of_a_vehicle_that_gains_speed_is_held_where_it_takes_energy():
     assert np.diag(unsure)[5] > 0.0
     assert not _of_still(problem, fit, fit.unknowns).any()
     after, zeros = _dissipative(problem, fit, problem.covariance(fit))
+    still = [every.entries[4]]
     found = Identified(vehicle, [], held_of([], 0.6), problem, after, problem.covariance(after), [],
-                       zeros, ())  # fmt: skip
+                       zeros, still)  # fmt: skip
     rows = found.coefficients()
     assert len({frozenset(row) for row in rows}) == 1
+    pitch, yaw = rows[-1], next(row for row in rows if row['name'] == 'D_linear.yaw')
+    assert (pitch.pop('prior'), pitch.pop('value')) == pytest.approx((vehicle.M[4, 4],) * 2)
+    assert pitch == {'name': 'M.pitch.pitch', 'unit': 'kg m²', 'left': 1.0, 'status': 'prior',
+                     'deviation': None, 'low': None, 'high': None}  # fmt: skip
+    most = fit.unknowns.coefficients(fit.theta).D_linear[5, 5]
+    most += fit.quantile * np.sqrt(problem.covariance(fit)[5, 5]) * u.entries[5].unit
+    assert (yaw['low'], yaw['high']) == (0.0, pytest.approx(max(most, 0.0)))
+    assert (yaw['prior'], yaw['value']) == (vehicle.D_linear[5, 5], 0.0)
     assert all((row['low'] is None) == (row['high'] is None) for row in rows)
     data = yaml.safe_load(shipped('vehicles', 'lauv').read_text()) | {'sign': 'sname'}
     data['lift'] = (-np.array(data['lift'])).tolist()

@@ -8,7 +8,20 @@ import pytest
 from helpers.sea_trials import SWINGS, gauss_markov, trial, truth
 from numpy.testing import assert_allclose
 
-from auv_analysis.studies.identify.identify import Settings, identify, split
+from auv_analysis.studies.identify import output_error
+from auv_analysis.studies.identify.identify import (
+    Settings,
+    _between,
+    _bias,
+    as_filed,
+    identify,
+    segment_length,
+    split,
+)
+from auv_analysis.studies.identify.intervals import far_from_quadratic, profile
+from auv_analysis.studies.identify.output_error import OutputError
+from auv_analysis.studies.identify.record import Record, segments_of
+from auv_analysis.studies.identify.unknowns import unknowns
 from auv_analysis.studies.identify.whiteness import told, whiteness
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
@@ -130,3 +143,125 @@ def test_an_observer_makes_intervals_narrower_under_a_disturbance(disturbed):
 def test_no_observer_where_there_is_no_disturbance(tmp_path):
     record, _ = trial(tmp_path, 'herman2018', 3, duration=40.0)
     assert identified(record, free=FREE, observer=None).problem.observer == 0.0
+
+
+def test_fits_with_other_delays_count_by_their_likelihood():
+    """As likely as the best one, a third and a quarter as likely: weights of 12, 4 and 3."""
+    fits = [
+        SimpleNamespace(cost=50.0 + 2.0 * np.log(less), theta=np.array(theta))
+        for less, theta in ((1, [1.0, 2.0]), (3, [2.0, 0.0]), (4, [1.0, 6.0]))
+    ]
+    expected = 4.0 * np.outer([1, -2], [1, -2]) + 3.0 * np.outer([0, 4], [0, 4])
+    assert_allclose(_between(fits), expected / 19.0)
+
+
+@pytest.mark.parametrize(('deviation', 'seen'), [(0.9, True), (1.1, False)])
+def test_what_shorter_segments_move_is_a_bias_where_it_is_no_chance(deviation, seen):
+    """Two deviations and more, of one unknown: then what all of them moved by."""
+    other = SimpleNamespace(theta=np.array([1.0, 5.0]))
+    halves = SimpleNamespace(
+        fit=lambda *_, **__: other, covariance=lambda _: np.diag([100.0, deviation**2])
+    )
+    found = _bias(SimpleNamespace(unknowns=None, theta=np.array([1.5, 3.0])), halves)
+    assert_allclose(found, seen * np.array([[0.25, -1.0], [-1.0, 4.0]]))
+
+
+@pytest.mark.parametrize(
+    ('growth', 'length'),
+    [([1, 2, 9.9, 10.1, 3, 20], 1.5), ([1, 10, 10, 10, 10, 10], 4.0), ([1, 11, 1, 1, 1, 1], 1.25)],
+)
+def test_a_segment_ends_where_an_error_has_grown_tenfold(growth, length):
+    problem = SimpleNamespace(
+        growth=lambda *_: np.array(growth), step=0.5,
+        segments=[SimpleNamespace(command=np.zeros((8, 6)))],
+    )  # fmt: skip
+    assert segment_length(problem, None, None) == length
+
+
+@pytest.mark.parametrize('rate', [0.7, -0.3])
+def test_an_error_grows_as_the_vehicle_is_unstable(rate):
+    """nu_dot = rate nu: by exp(rate t), relative to the largest of the first second."""
+    rov = load_vehicle('bluerov2_heavy')
+    M = np.diag(np.diag(rov.M))
+    vehicle = rov.changed(M=M, D_linear=-rate * M, D_quadratic=np.zeros((6, 6)),
+                          buoyancy=float(rov.weight), r_B=rov.r_G)  # fmt: skip
+    t, ahead = 0.05 * np.arange(141), np.tile([1.0, 0.0, 0.0, 0.0], (141, 1))
+    still = Record('x', t, ahead, t, np.zeros((141, 6)), 0.05, np.zeros((140, 6)), 0.0)
+    noise = np.linspace(0.01, 0.09, 9)
+    problem = OutputError(vehicle, segments_of(still, 2.0, 0.6), 0.05, noise)
+    growth, t = problem.growth(*as_filed(vehicle)), t[:41]
+    assert_allclose(growth, np.exp(rate * t) / max(np.exp(rate), 1.0), rtol=1e-5)
+
+
+def test_blocks_of_time_are_segments_parts_of_them_or_several(quiet, monkeypatch):
+    """They add up to what all segments tell, however many are simulated at once."""
+    segments = segments_of(quiet.training[0], 2.0, 0.6)[:5]
+    problem = replace(quiet.problem, segments=segments)
+    u, theta = quiet.fit.unknowns, quiet.fit.theta
+
+    def blocks(fewest, most, size=1 << 24):
+        for name, value in (('BLOCKS', fewest), ('MOST_BLOCKS', most), ('BYTES', size)):
+            monkeypatch.setattr(output_error, name, value)
+        fit = problem.fit(u, theta, most=0)
+        found = problem.blocks(fit)
+        assert len(found.A) == len(found.g) == fit.blocks
+        return found
+
+    one = blocks(5, 400)
+    few = len(theta) * len(segments[0].command) * 13 * 8 * 3  # fewer than all at once
+    for of in ('A', 'g'):
+        alone = getattr(one, of)
+        assert len(alone) == 5
+        halves, several, in_turn = (
+            getattr(made, of) for made in (blocks(9, 400), blocks(1, 2), blocks(5, 400, few))
+        )
+        assert_allclose(halves[::2] + halves[1::2], alone, rtol=1e-9, atol=1e-9)
+        assert np.abs(halves[0] - halves[1]).max() > 1e-3
+        assert_allclose(several, [alone[:3].sum(axis=0), alone[3:].sum(axis=0)])
+        assert_allclose(in_turn, alone, rtol=0.0, atol=1e-5 * np.abs(alone).max())
+
+
+class Bent:
+    """A problem of one coefficient whose cost is a parabola, of which one side may be bent."""
+
+    def __init__(self, u, deviation, bend):
+        self._u, self._deviation, self._bend = u, deviation, bend
+
+    def cost(self, u, theta, starts):
+        away = float(self._u.values(theta)[0] - self._u.values(np.zeros(1))[0]) / self._deviation
+        return 50.0 + (away**2 if away > 0 else self._bend(away**2))
+
+    def fit(self, held, theta, starts, **_):
+        """Where the coefficient is held."""
+        ((wanted, _),) = held.believed.values()
+        moved = (wanted - self._u.values(np.zeros(1))[0]) / self._u.entries[0].unit
+        return SimpleNamespace(theta=np.array([moved]), starts=starts)
+
+    def normal(self, *_):
+        return SimpleNamespace(eliminated=lambda: (None, None, np.zeros((1, 9, 2))))
+
+
+@pytest.mark.parametrize(
+    ('bend', 'low', 'far'),
+    [(lambda x: x, -1.0, False), (lambda x: 0.0, None, True), (lambda x: 4.0 * x, -0.5, True)],
+)
+def test_a_profile_ends_where_the_cost_has_risen_enough_or_nowhere(bend, low, far):
+    """The sandwich is twice as wide as white noise: a rise counts for a quarter."""
+    u = unknowns(HERMAN, ('D_linear.yaw',), speeds=np.ones(6), wrenches=np.ones(6))
+    prior, white = HERMAN.D_linear[5, 5], 0.25
+    information = np.array([[(u.entries[0].unit / white) ** 2 - 1.0]])  # beside the prior's
+    fit = SimpleNamespace(unknowns=u, theta=np.zeros(1), starts=np.zeros((1, 9)), cost=50.0,
+                          quantile=2.5, information=information)  # fmt: skip
+    covariance = np.array([[(2.0 * white / u.entries[0].unit) ** 2]])
+    problem = Bent(u, white, bend)
+    found = profile(problem, fit, covariance, 'D_linear.yaw')
+    half = 2.5 * 0.5
+    assert found.deviation == pytest.approx(0.5)
+    assert found.high == pytest.approx(prior + half)
+    assert found.low == (low if low is None else pytest.approx(prior + low * half, rel=1e-3))
+    assert np.all(np.diff(found.values) > 0)
+    away = (found.values - prior) / 0.5
+    expected = [x**2 if x > 0 else bend((2.0 * x) ** 2) / 4.0 for x in away]
+    assert_allclose(found.rise, expected, atol=1e-9)
+    assert found.rise.max() > 2.5**2
+    assert far_from_quadratic(problem, fit, covariance) == ['D_linear.yaw'] * far

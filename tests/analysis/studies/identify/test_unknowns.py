@@ -121,6 +121,50 @@ def test_a_coupling_that_is_believed_is_so_whatever_is_believed_of_its_diagonal(
     assert_allclose((found[4, 2], found[4, 4]), (0.8 * M[4, 2], 1.3 * M[4, 4]))
 
 
+def test_the_precision_of_the_prior_is_the_curvature_of_its_cost():
+    M = load_vehicle('herman2018').M
+    believed = {'M.heave.heave': (550.0, 5.0), 'M.pitch.heave': (0.9 * M[4, 2], 0.5),
+                'lag': (0.15, 0.02), 'D_linear.yaw': (20.0, 3.0)}  # fmt: skip
+    u = made(load_vehicle('herman2018'), DEFAULT, believed=believed, lag=0.1)
+    n = len(u.entries)
+    theta, h = 0.1 * np.random.default_rng(6).normal(size=n), 1e-5 * np.eye(n)
+
+    def slope(of, at):
+        return np.array([(of(at + move) - of(at - move)) / 2e-5 for move in h])
+
+    _, gradient = u.precision(theta)
+    expected = slope(u.prior_cost, theta) / 2.0
+    assert_allclose(gradient, expected, rtol=1e-5, atol=1e-6 * np.abs(expected).max())
+    precision, at_prior = u.precision(np.zeros(n))
+    assert_allclose(at_prior, 0.0, atol=1e-9)
+    curved = slope(lambda at: u.precision(at)[1], np.zeros(n))
+    assert_allclose(precision, curved, atol=1e-4 * np.abs(curved).max())
+
+
+def test_a_deviation_of_damping_is_three_times_what_the_prior_resists():
+    """At the speeds of the recording, a tenth of the wrench and of M nu / 10 s at least."""
+    vehicle = load_vehicle('herman2018').changed(
+        D_linear=np.diag([70.0, 100.0, 0.1, 4.0, 5.0, 6.0]),
+        D_quadratic=np.diag([30.0, 40.0, 0.1, 1.0, 2.0, 3.0]),
+    )
+    speeds, wrenches = np.array([0.5, 0.4, 0.3, 0.2, 0.1, 0.25]), np.zeros(6)
+    wrenches[1] = 900.0
+    u = unknowns(vehicle, EVERY, speeds=speeds, wrenches=wrenches)
+    drag = {'surge': (70.0 + 30.0 * 0.5) * 0.5, 'sway': 90.0,
+            'heave': 0.01 * vehicle.M[2, 2] * 0.3}  # fmt: skip
+    unit = {entry.name: entry.unit for entry in u.entries}
+    for i, (dof, resisted) in enumerate(drag.items()):
+        assert unit[f'D_linear.{dof}'] == pytest.approx(3.0 * resisted / speeds[i])
+        assert unit[f'D_quadratic.{dof}'] == pytest.approx(3.0 * resisted / speeds[i] ** 2)
+    shared = np.sqrt(drag['surge'] * drag['sway'])
+    assert unit['D_linear.sway.surge'] == pytest.approx(3.0 * shared / np.sqrt(0.5 * 0.4))
+    assert unit['D_quadratic.surge.sway'] == pytest.approx(3.0 * shared / (0.5 * 0.4))
+    weight = float(vehicle.weight)
+    assert [unit[f'bias.{dof}'] for dof in ('surge', 'sway', 'yaw')] == pytest.approx(
+        [1e-3 * weight, 900.0, 1e-4 * weight]
+    )
+
+
 def test_units_of_coupled_damping_are_those_of_force_and_velocity():
     si = {entry.name: entry.si for entry in made(load_vehicle('herman2018')).entries}
     assert (si['D_linear.sway.yaw'], si['D_linear.yaw.sway']) == ('N/rad/s', 'N m/m/s')

@@ -12,9 +12,10 @@ from helpers.closed_loops import PAPER
 from numpy.testing import assert_allclose
 
 from auv_analysis import linearize, load_scenario, simulate
-from auv_analysis.studies.linearize.linearize import jacobian
+from auv_analysis.studies.linearize.linearize import jacobian, state_names
 from auv_analysis.studies.linearize.modes import modes
 from auv_dynamics import load_vehicle
+from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.kinematics import jacobian as kinematics
 
 NU = np.array([0.8, -0.2, 0.3, 0.05, -0.1, 0.2])
@@ -39,10 +40,12 @@ def test_derivatives_of_what_has_a_corner_in_its_slope():
     assert error[0, 0] > 1e-9  # what is not quadratic shows in the error
 
 
-@pytest.mark.parametrize('name', ['rexrov', 'bluerov2', 'lauv'])
-def test_vehicle_alone_against_differences_of_its_dynamics(name):
+@pytest.mark.parametrize(
+    ('name', 'surge'), [('rexrov', 0.8), ('bluerov2', 0.8), ('lauv', 0.8), ('lauv', -0.6)]
+)
+def test_vehicle_alone_against_differences_of_its_dynamics(name, surge):
     vehicle = load_vehicle(name)
-    model = linearize(vehicle, NU, eta0=ETA)
+    model = linearize(vehicle, [surge, *NU[1:]], eta0=ETA)
 
     def rate(y):
         eta, nu, tau = np.array([0, 0, 0, *y[:2], ETA[5]]), y[2:8], y[8:14]
@@ -144,6 +147,26 @@ def test_own_law_of_a_user(monkeypatch):
     assert model.states[8:] == tuple(name.replace('nu', 'law1') for name in model.states[2:8])
 
 
+def test_states_of_a_law_are_named_by_axis_where_they_are_blocks_of_six():
+    assert state_names(12)[8:] == tuple(f'law{i}[{dof}]' for i in (1, 2) for dof in DOFS)
+    assert state_names(7)[8:] == tuple(f'law[{i}]' for i in range(1, 8))
+
+
+def test_groups_of_inputs_and_outputs_are_taken_in_the_order_in_which_they_are_asked_for():
+    given = {'nu0': CRUISE, 'law': 'gvc', 'gains': PAPER}
+    whole = linearize('rexrov', inputs=('nu_d', 'nu_d_dot', 'F'), **given)
+    some = linearize('rexrov', inputs=('F', 'nu_d'), outputs='tau', **given)
+    columns, rows = [*range(12, 18), *range(6)], slice(6, 12)
+    assert some.inputs == tuple(f'{group}[{dof}]' for group in ('F', 'nu_d') for dof in DOFS)
+    assert some.outputs == whole.outputs[rows] == tuple(f'tau[{dof}]' for dof in DOFS)
+    for found, expected in (
+        (some.A, whole.A), (some.B, whole.B[:, columns]), (some.C, whole.C[rows]),
+        (some.D, whole.D[rows][:, columns]), (some.u0, whole.u0[columns]),
+        (some.y0, whole.y0[rows]),
+    ):  # fmt: skip
+        assert_allclose(found, expected, atol=1e-12)
+
+
 def test_python_control_takes_it():
     import control
 
@@ -177,6 +200,11 @@ def test_modes_of_a_pendulum():
 def test_what_cannot_be_linearised_is_refused(changes, match):
     with pytest.raises(ValueError, match=match):
         linearize('bluerov2', **changes)
+
+
+def test_a_controller_and_a_law_are_one_too_many(small_step):
+    with pytest.raises(ValueError, match='expected controller or law, found both'):
+        linearize(small_step[0], law='gvc', gains=PAPER, controller='gvc')
 
 
 def test_current_is_refused(small_step):

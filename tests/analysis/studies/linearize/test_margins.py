@@ -90,8 +90,10 @@ def at_border(inside, outside):
 @pytest.mark.parametrize(('law', 'late'), [*product(LAWS, [(0.0, 0.0), (0.03, 0.0), (0.05, 0.15)])])
 def test_margins_are_where_a_second_sampling_of_the_loop_turns_unstable(law, late):
     setting = ControlLoop(scenario_of(), law, *late, nu0=CRUISE)
-    loop = setting.loop()
+    loop, wild = setting.loop(), setting.loop((100.0,) * 6)
     assert stable(loop)
+    assert_allclose(np.abs(wild.multipliers).max(), grown(wild), rtol=1e-9)
+    assert not stable(wild)
     found = setting.margins(loop)
     for i, one in enumerate(found):
         unit = np.eye(6)[i]
@@ -245,6 +247,32 @@ def test_a_gain_that_is_too_small_for_its_integral_has_a_larger_one():
     for times in (0.9999, 1.0001):
         scale = [times * factor, *[1.0] * 5]
         assert setting.margins(setting.loop(scale))[0].kept == (times < 1)
+
+
+@pytest.mark.parametrize(
+    ('kept', 'factor'),
+    [((0.0, 1e9), np.inf), ((0.3, 4.0), 4.0), ((0.02, 0.5), 0.5), ((3.0, 7.0), 7.0),
+     ((3.0, 1e9), np.inf), ((1e3, 1e9), 0.0)],
+)  # fmt: skip
+@pytest.mark.parametrize('axis', [None, 4])
+def test_the_largest_gain_is_the_end_of_a_range_that_keeps_the_margins(
+    kept, factor, axis, monkeypatch
+):
+    """Of the range around the present gain, else of the one below it, else of the one above."""
+    low, high = kept
+
+    def margins_of(scale, i, *_, delays):
+        value = scale[i] if axis in (None, i) else pytest.fail('an axis that is not scaled')
+        return SimpleNamespace(to_spare=min(np.log(value / low) if low else 9.0, high / value - 1))
+
+    asked = []
+    setting = SimpleNamespace(loop=lambda scale: asked.append(scale) or scale.copy(),
+                              sensitivity=lambda loop: (None, np.zeros((1, 6, 6))))  # fmt: skip
+    monkeypatch.setattr(margins, 'axis_margins', margins_of)
+    monkeypatch.setattr(margins, 'stable', lambda loop: True)
+    assert ControlLoop.largest(setting, axis) == pytest.approx(factor, rel=1e-5)
+    others = np.delete(np.array(asked), axis if axis is not None else range(6), axis=1)
+    assert np.all(others == 1.0)
 
 
 @pytest.mark.parametrize('law', LAWS)
@@ -437,6 +465,56 @@ def test_a_scenario_without_delay_says_nothing_and_one_with_it_its_margins(appro
     assert warning.startswith('warning: ')
     assert 'below 6 dB and 45 deg' in warning
     approved.add([note, warning])
+
+
+def test_a_loop_that_is_unstable_or_that_nobody_can_judge_is_named():
+    fast = scenario_of(controllers={'gvc': LAWS['gvc'] | {'k_D': 80.0}})
+    (warning,) = margin_notes(fast, ['gvc'], delay=0.04)
+    assert warning.startswith(f'warning: {fast.path}: controllers.gvc: unstable with a loop delay')
+    (note,) = margin_notes(fast, ['gvc'], delay=9.0)
+    assert note == (
+        f'note: {fast.path}: controllers.gvc: no margins: delay: expected 0 to 2 s, 100 steps, '
+        'found 9'
+    )
+    behind = scenario_of(actuators={'thrusters': True, 'rotor_lag': 0.05})
+    (note,) = margin_notes(behind, ['gvc'])
+    assert 'a lag of 0 s beside that of the rotors' in note
+    driven = scenario_of(controllers={'still': {'law': 'multisine'}}, excitation={})
+    assert margin_notes(driven, ['still'], driver=True) == []
+    with pytest.raises(ValueError, match=r'lag: expected 0 to 2 s, 100 steps, found -0\.1'):
+        ControlLoop(fast, 'gvc', lag=-0.1)
+
+
+def test_the_note_is_of_the_worse_of_rest_and_way(monkeypatch):
+    """What cannot be held under way is left out, what cannot be held at rest has no margins."""
+    scenario = scenario_of(actuators={'delay': 0.04}, setpoint={'surge': {'offset': 0.5}})
+    loops = {'rest': (6.0, 50.0), 'way': (4.0, 60.0)}  # gain, degrees of phase
+
+    def loop(setting, *_):
+        name = 'way' if np.any(setting.nu0) else 'rest'
+        if loops[name] is None:
+            raise ArithmeticError('lost')
+        return name
+
+    def found(setting, name, *, delays):
+        gain, phase = loops[name]
+        one = margins.AxisMargins(gain=gain, reduction=0.1, phase=np.radians(phase))
+        return (margins.AxisMargins(),) * 4 + (one, margins.AxisMargins())
+
+    monkeypatch.setattr(ControlLoop, 'loop', loop)
+    monkeypatch.setattr(ControlLoop, 'margins', found)
+    monkeypatch.setattr(margins, 'stable', lambda loop: True)
+    (note,) = margin_notes(scenario, ['gvc'])
+    assert 'gain margin 12 dB (pitch), phase margin 50 deg (pitch)' in note
+    assert note.startswith('note: ')
+    loops['way'] = (4.0, 44.0)
+    (note,) = margin_notes(scenario, ['gvc'])
+    assert note.startswith('warning: ')
+    loops['way'] = None
+    (note,) = margin_notes(scenario, ['gvc'])
+    assert 'gain margin 15.6 dB (pitch)' in note
+    loops['rest'] = None
+    assert margin_notes(scenario, ['gvc'])[0].endswith('controllers.gvc: no margins: lost')
 
 
 def test_what_is_odd_about_a_scenario_is_said(capsys):

@@ -41,6 +41,8 @@ def test_it_begins_and_ends_with_zero_and_goes_both_ways() -> None:
     assert [one.trial.dof for one in excitation.sent] == ['surge', 'yaw', 'surge']
     assert driver.sent[0] == ZERO
     assert driver.sent[-LAST:] == [ZERO] * LAST
+    goodbye = driver.now_ns() - excitation.sent[-1].ended_ns
+    assert goodbye == pytest.approx(GOODBYE * 1e9), 'as steadily as the others'
     rows = np.array(driver.sent)
     assert rows[:, 0].max() == -rows[:, 0].min() > 0
     assert rows[:, 5].max() == -rows[:, 5].min() > 0
@@ -189,6 +191,18 @@ def test_nothing_is_sent_where_another_begins_to_command_in_the_countdown(monkey
     assert excitation.aborted == '/somebody publishes the wrench as well'
     assert driver.sent == []
     assert asked == ['advertise', 'retire']
+
+
+def test_a_user_who_wants_an_end_in_the_countdown_gets_it_before_anything_is_sent() -> None:
+    driver, asked = SimulatedDriver(), []
+    driver.advertise = lambda: asked.append('advertise')
+    driver.retire = lambda: asked.append('retire')
+    driver.listen = lambda _: asked.append('listen') or signal.raise_signal(signal.SIGINT)
+    plan = planned(driver.vehicle, ('surge',), 0.1, None, None)
+    with pytest.raises(KeyboardInterrupt):
+        actuate(driver, plan, 0.5)
+    assert asked == ['advertise', 'listen', 'retire']
+    assert driver.sent == []
 
 
 def test_nothing_is_sent_to_a_driver_that_does_not_hear_it(monkeypatch) -> None:

@@ -129,6 +129,13 @@ def test_a_conflict_names_the_policy_and_advises() -> None:
     assert found['qos_controller'].verdict == found['qos_wrench'].verdict == PASS
 
 
+@pytest.mark.parametrize('key', ['controller', 'recorder', 'wrench'])
+def test_each_conflict_is_of_the_one_who_has_it(key: str) -> None:
+    found = seen_in(graph(conflicts={key: 'they differ'}))
+    assert [id for id, one in found.items() if one.verdict == FAIL] == [f'qos_{key}']
+    assert found[f'qos_{key}'].found.endswith('durability volatile: they differ')
+
+
 def test_every_check_is_made_once_in_the_order_of_the_catalogue() -> None:
     for seen in (graph(), graph(odom_publishers=())):
         assert list(found_in(healthy(), *CHECKS, seen=seen)) == list(CHECKS)

@@ -1,5 +1,7 @@
 """Frame ids and numbers of single messages."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers.made_odometry import found_in as found_by
@@ -66,6 +68,37 @@ def test_numbers_that_are_not_finite_fail(bad: float, column: int, name: str) ->
     finding = found_in(odometry_log(x))['finite']
     assert finding.verdict == FAIL
     assert f'1 of 500 messages have numbers that are not, in {name}' in finding.found
+
+
+def test_messages_that_are_none_of_their_type_count_beside_those_with_wrong_numbers() -> None:
+    x = motion()
+    x[7, 1] = np.nan
+    for log, count in ((healthy(), 5), (odometry_log(x), 6)):
+        finding = found_in(replace(log, unreadable={'/odom': 3, '/wrench_applied': 2}))['finite']
+        assert finding.verdict == FAIL
+        assert finding.numbers['messages'] == count
+        assert '; 3 of /odom are no messages of its type' in finding.found
+
+
+def test_what_is_taken_stands_in_the_log_under_its_name() -> None:
+    buffer, ones = OdometryBuffer(), np.arange(13.0)
+    for k in range(3):
+        buffer.odometry(10 + k, 20 + k, tuple(k * ones), ('a', 'b' if k else 'c'), k)
+        buffer.clock(30 + k, 40 + k)
+        buffer.wrench_applied(50 + k, tuple(k * ones[:6]))
+    for topic in ('/x', '/y', '/x'):
+        buffer.unreadable(topic, None)
+    log = buffer.log(1, 2_000_000_001)
+    assert (log.began_ns, log.ended_ns, log.seconds) == (1, 2_000_000_001, 2.0)
+    stamps = (log.arrived_ns, log.stamp_ns, log.clock_arrived_ns, log.clock_ns)
+    np.testing.assert_array_equal(stamps, np.add.outer([10, 20, 30, 40], range(3)))
+    np.testing.assert_array_equal(log.applied_arrived_ns, [50, 51, 52])
+    np.testing.assert_array_equal(log.x, np.outer(range(3), ones))
+    np.testing.assert_array_equal(log.applied, np.outer(range(3), ones[:6]))
+    assert log.frames == {('a', 'c'): 1, ('a', 'b'): 2}
+    assert log.unreadable == {'/x': 2, '/y': 1}
+    np.testing.assert_array_equal(buffer.recent(2), log.x[1:])
+    assert buffer.newest == (12, 22, tuple(2.0 * ones))
 
 
 @pytest.mark.parametrize(('factor', 'verdict'), [(1.0009, PASS), (1.0011, FAIL), (0.5, FAIL)])

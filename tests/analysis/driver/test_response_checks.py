@@ -1,5 +1,7 @@
 """Small wrenches and the answer to them: each fault of a mapping is told, a healthy one passes."""
 
+from types import SimpleNamespace as Made
+
 import numpy as np
 import pytest
 from helpers.made_odometry import graph
@@ -18,6 +20,7 @@ from auv_analysis.driver.evidence import (
 from auv_analysis.driver.excitation import carry_out
 from auv_analysis.driver.plan import HELD, LEVEL, PULSE, SWING, UNHEARD, ZERO, Plan, plan_of
 from auv_analysis.driver.response import Noise, fit_response, predicted
+from auv_analysis.driver.response_checks import command_to_response_delay
 from auv_dynamics import Vehicle, load_vehicle
 from auv_dynamics.vehicle import DOFS
 
@@ -169,6 +172,10 @@ def test_the_bound_holds_on_the_model_and_caps_are_kept() -> None:
             held = [(0.0, PULSE, trial.tau), (PULSE, 2 * PULSE, back)]
             added = predicted(vehicle, np.eye(13)[3], held).added
             assert 0.01 < np.abs(added).max() <= 0.101, (name, trial.dof)
+    heavy = load_vehicle('bluerov2_heavy')
+    for dofs, last in ((['heave', 'yaw'], 'yaw'), (['pitch', 'heave'], 'heave')):
+        plan = plan_of(heavy, dofs, 0.1, None, None)  # ends with what nothing rights
+        assert (plan.trials[-1].dof, plan.trials[-1].silent) == (last, True)
     plan: Plan = plan_of(load_vehicle('rexrov'), (), 0.1, 5.0, 2.0)
     assert {trial.size for trial in plan.trials} == {5.0, 2.0}
     assert plan.trials[-1].silent
@@ -240,6 +247,57 @@ def test_the_delay_is_measured_and_what_to_do_with_it_is_said() -> None:
     assert set(delay['axes']) == set(AXES)
     found = CHECKS['response_delay'].finding(evidence)
     assert f'auv linearize SCENARIO {delay["option"]}' in found.found
+
+
+def answer(dof: str, delay: float, error: float, pulse: float = 1.0, sign: int = 1) -> Made:
+    fit = Made(sign=sign, delay=delay, delay_error=error)
+    return Made(trial=Made(dof=dof, pulse=pulse), response=fit)
+
+
+def test_a_delay_is_the_median_of_the_axes_and_as_unsure_as_they_are_apart() -> None:
+    some = [answer('surge', 0.1, 0.01), answer('sway', 0.14, 0.03), answer('yaw', 0.42, 0.02)]
+    undecided = answer('heave', 0.9, 0.0, sign=0)
+    bounded = answer('roll', 0.24, 0.01, pulse=0.5)  # as late as half of its pulse
+    delay = command_to_response_delay(Made(answered=[*some, undecided, bounded]))
+    assert delay.axes == {'surge': (0.1, 0.01), 'sway': (0.14, 0.03), 'yaw': (0.42, 0.02)}
+    assert delay.seconds == 0.14
+    assert delay.uncertainty == pytest.approx(1.48 * 0.04)
+    one = command_to_response_delay(Made(answered=[answer('yaw', 0.2, 0.03, sign=-1), undecided]))
+    assert (one.seconds, one.uncertainty) == (0.2, pytest.approx(0.03))
+    errors = [answer('surge', 0.2, 0.03), answer('yaw', 0.2, 0.04)]
+    two = command_to_response_delay(Made(answered=errors))
+    assert two.uncertainty == pytest.approx(0.05 / np.sqrt(2.0))
+    assert command_to_response_delay(Made(answered=[bounded])).seconds == 0.24
+    assert command_to_response_delay(Made(answered=[undecided])) is None
+
+
+@pytest.mark.parametrize(
+    ('delays', 'verdict', 'most'),
+    [
+        ((0.1, 0.3, 0.49), PASS, '0.49 s at most'),
+        ((0.1, 0.31, 0.5), FAIL, 'at least 0.50 s at most'),
+    ],
+)
+def test_a_delay_that_may_be_longer_is_said_to_be(delays, verdict: str, most: str) -> None:
+    axes = [answer(dof, delay, 0.01, 2.0) for dof, delay in zip(AXES, delays, strict=True)]
+    found = CHECKS['response_delay'].judge(Made(answered=axes))
+    assert (found.verdict, found.numbers['largest_s']) == (verdict, delays[-1])
+    assert f'(median of 3), {most}; for gains' in found.found
+
+
+@pytest.mark.parametrize(
+    ('until', 'verdict', 'ceased'), [(0.0, PASS, 0.0), (0.9, PASS, 0.9), (1.2, FAIL, 1.2)]
+)
+def test_what_was_applied_tells_when_a_driver_let_go(until: float, verdict: str, ceased) -> None:
+    """At 10 Hz from half a second before the last wrench on; a twentieth of it is none."""
+    t = np.arange(-5, 21) / 10.0
+    applied = np.zeros((len(t), 6))
+    applied[:, 5] = np.where(t <= until, -2.0, 0.09)
+    trial = Made(dof='yaw', size=2.0, silent=True)
+    one = Made(trial=trial, applied_t=t + 3.0, applied=applied, silent_from=3.0)
+    found = CHECKS['silence'].judge(Made(trials=[Made(trial=Made(silent=False)), one]))
+    assert (found.verdict, found.numbers['ceased_s']) == (verdict, pytest.approx(ceased))
+    assert found.numbers['watched_s'] == pytest.approx(2.0)
 
 
 def test_noise_is_measured_at_rest() -> None:

@@ -128,6 +128,9 @@ def test_only_failures_fail() -> None:
     assert failure_of(broken) == f'1 of {len(CHECKS)} checks failed: frames'
     gone = judge(replace(listened(), graph=graph(odom_publishers=())))
     assert failure_of(gone).startswith('nobody publishes /odom in ROS_DOMAIN_ID=7')
+    both = graph().odom_publishers * 2
+    several = judge(replace(listened(), graph=graph(odom_publishers=both)))
+    assert failure_of(several) == f'1 of {len(CHECKS)} checks failed: odom_publisher'
 
 
 def test_the_terminal_shows_each_failure_with_what_was_expected_and_advice() -> None:

@@ -1,6 +1,7 @@
 """Twist against pose: each usual mistake is told by its name, with noise as without it."""
 
 from collections.abc import Callable
+from types import SimpleNamespace as Made
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from auv_analysis.driver.evidence import (
     Settings,
 )
 from auv_analysis.driver.twist_checks import _rms
-from auv_analysis.metrics.pose_twist import ANGULAR, CHILD, LINEAR, fit_readings
+from auv_analysis.metrics.pose_twist import ANGULAR, CHILD, LINEAR, TwistFit, fit_readings
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.frames import swap_attitude, swap_body, swap_position, swap_state
 from auv_dynamics.vehicle.kinematics import euler, rotation
@@ -237,6 +238,53 @@ def test_broken_messages_are_left_out_and_few_tell_nothing() -> None:
     assert {one.verdict for one in found_in(x[:5]).values()} == {NOT_CHECKED}
 
 
+def test_messages_that_arrived_together_are_one_and_times_rise() -> None:
+    heard = odometry_log(motion())
+    heard.stamp_ns[:] = heard.stamp_ns[0]
+    heard.arrived_ns[10] = heard.arrived_ns[9] - 5
+    heard.arrived_ns[12] = heard.arrived_ns[11]
+    heard.x[20, 3:7] *= 1.05
+    heard.x[21, 3:7] *= 1.2  # which is no attitude
+    m = DriverRecord(graph(), heard, Settings()).motion
+    kept = np.delete(np.arange(500), [10, 12, 21])
+    assert m.by_arrival
+    np.testing.assert_allclose(m.t, (heard.arrived_ns[kept] - heard.arrived_ns[0]) / 1e9)
+    np.testing.assert_array_equal(m.nu, heard.x[kept, 7:])
+    np.testing.assert_allclose(np.linalg.norm(m.q, axis=1), 1.0)
+
+
+def test_what_came_before_the_first_wrench_is_uncommanded() -> None:
+    heard = odometry_log(motion())
+    steps = [(int(heard.arrived_ns[40]), (0.0,) * 6), (int(heard.arrived_ns[60]), (1.0,) * 6)]
+    excitation = Made(sent=[Made(steps=[]), Made(steps=steps)])
+    for sent, count in ((None, 500), (Made(sent=[]), 500), (excitation, 40)):
+        evidence = DriverRecord(graph(), heard, Settings(), sent)
+        assert evidence.uncommanded.tolist() == [i < count for i in range(500)]
+
+
+@pytest.mark.parametrize(
+    ('child', 'flu', 'right', 'others'),
+    [(0.3, 0.25, True, ['flu']), (0.31, 0.25, False, ['flu']), (0.19, 0.05, True, ['flu']),
+     (0.21, 0.05, False, ['flu']), (0.1, 0.01, True, ['flu']), (0.01, 0.11, True, []),
+     (0.05, 0.4, True, [])],
+)  # fmt: skip
+def test_a_reading_is_possible_where_it_fits_and_none_fits_far_better(
+    child: float, flu: float, right: bool, others: list[str]
+) -> None:
+    fit = TwistFit(0.1, 0.2, 0.0, {CHILD: child, 'flu': flu}, (0.0,) * 3, 0.0, 1.0, 0.0)
+    assert (fit.right, fit.others) == (right, others)
+    assert fit.best == ('flu' if flu < child else CHILD)
+
+
+@pytest.mark.parametrize(
+    ('speeds', 'noise', 'told'),
+    [((0.03, 0.01), 0.02, True), ((0.01, 0.03), 0.02, True), ((0.03, 0.03), 0.04, False),
+     ((0.019, 0.01), 0.0, False)],
+)  # fmt: skip
+def test_axes_are_told_by_motion_beyond_its_noise(speeds, noise: float, told: bool) -> None:
+    assert TwistFit(*speeds, noise, {CHILD: 0.0}, (0.0,) * 3, 0.0, 1.0, 0.0).told is told
+
+
 def test_the_right_reading_fits_and_all_others_do_not() -> None:
     heard = odometry_log(motion(speed=3.0, noise=1e-3))
     m = DriverRecord(graph(), heard, Settings()).motion
@@ -283,6 +331,16 @@ def test_a_biased_velocity_is_told_from_a_current_by_the_position_at_rest() -> N
     carried = found_in(with_parts(x, p=way, v=v))['velocity_bias']
     assert carried.verdict == PASS
     assert 'which agree: a current, or a moving origin' in carried.found
+
+
+@pytest.mark.parametrize(
+    ('moves', 'verdict'), [(slice(0, 300), FAIL), (slice(400, 500), NOT_CHECKED)]
+)
+def test_a_vehicle_that_was_moved_is_at_rest_where_it_is_so_in_the_end(moves, verdict) -> None:
+    x = at_rest()
+    x[:, 7] += 0.05
+    x[moves, 8] += 0.3 * np.sin(np.arange(500)[moves] / 20.0)
+    assert found_by(odometry_log(x), 'velocity_bias')['velocity_bias'].verdict == verdict
 
 
 def test_at_rest_nothing_is_told_of_a_bias_that_is_not_there() -> None:

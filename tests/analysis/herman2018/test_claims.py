@@ -95,6 +95,18 @@ def test_a_run_with_what_the_papers_have_not_is_none_of_the_papers(case1):
     assert paper.paper_figures(gvc)[0].endswith('figure 1')
 
 
+def test_figures_of_the_paper_are_named_by_case_and_law(case1, case2):
+    numbers = [
+        [words.rpartition(' figure ')[2] for words in paper.paper_figures(runs[law])]
+        for runs in (case1, case2) for law in ('gvc', 'cl')
+    ]  # fmt: skip
+    assert numbers == [
+        ['1', '3', '4', '5'], ['2'], ['1', '3', '7', '4', '5'], ['6(a,b)', '6(c,d)', '6(e,f)'],
+    ]  # fmt: skip
+    kinds = [words.partition(' is ')[0] for words in paper.paper_figures(case2['gvc'])]
+    assert kinds == ['errors', 'lumped_error', 'inputs', 'delta_xi', 'delta_pi']
+
+
 def test_verdicts_of_case_2(table2, approved):
     approved.add(_lines(table2))
     decided = CASE2_ONLY | {21}

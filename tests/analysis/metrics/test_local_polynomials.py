@@ -8,9 +8,14 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.signal import savgol_coeffs, savgol_filter
 
+from auv_analysis.metrics import local_polynomials
 from auv_analysis.metrics.local_polynomials import (
     ORDER,
     SMALLEST,
+    Stretch,
+    filtered,
+    given_window,
+    narrow_window,
     nearest,
     rates,
     residuals,
@@ -92,3 +97,68 @@ def test_a_value_is_that_of_the_fitted_polynomial() -> None:
     (w,) = weights(t, np.array([0.4]), np.arange(9)[None], 3, rate=False)
     expected = np.polyval(np.polyfit(t, np.sin(5 * t), 3), 0.4)
     assert (w @ np.sin(5 * t))[0] == pytest.approx(expected, abs=1e-12)
+
+
+def test_windows_that_are_worked_on_one_after_the_other_give_the_same(monkeypatch) -> None:
+    rng = np.random.default_rng(9)
+    t, values = np.cumsum(rng.uniform(0.01, 0.05, 70)), rng.normal(size=(70, 2))
+    at = np.linspace(t[0], t[-1], 23)
+    whole = (*rates(t, values, at, 13), *residuals(t, values))
+    monkeypatch.setattr(local_polynomials, 'AT_ONCE', 4 * 13)
+    for one, other in zip((*rates(t, values, at, 13), *residuals(t, values)), whole, strict=True):
+        assert_allclose(one, other, rtol=1e-12)
+
+
+@pytest.mark.parametrize(('window', 'count'), [(0.5, 25), (0.53, 27), (0.51, 25), (0.1, 9)])
+def test_a_window_has_an_odd_number_of_samples_and_nine_at_least(window, count) -> None:
+    assert given_window(window, 0.02).tolist() == [count] * 6
+
+
+def stretch(t: np.ndarray, y: np.ndarray, **known: np.ndarray) -> Stretch:
+    """A signal, of which nothing is doubtful but what is said; asked for between its samples."""
+    nothing = {'doubt': np.zeros_like(y), 'spread': np.zeros_like(y)}
+    return Stretch(t=t, y=y, at=t[20:-20] + 0.013, **(nothing | known))
+
+
+def test_what_is_noise_gets_a_wide_window_and_what_moves_fast_a_narrow_one() -> None:
+    """Tried are 9, 13, 19, 27, 37 and 51 samples of 200: two fewer than the best."""
+    t = 0.02 * np.arange(200)
+    y = np.random.default_rng(10).normal(size=(200, 6))
+    y[:, [1, 4]] = np.sin(12.0 * t)[:, None]
+    some = [stretch(t, y), stretch(t[:150], y[50:])]
+    assert narrow_window(some).tolist() == [27, 9, 27, 27, 9, 27]
+
+
+def test_an_error_is_made_of_what_was_integrated_and_of_what_the_signal_is_off() -> None:
+    """Of two stretches, each column with a window of its own: a line is exact under any of them."""
+    slopes, doubts = np.arange(1.0, 7.0), np.array([0.0, 0.3, 0.1, 0.0, 0.2, 0.4])
+    spreads, counts = np.array([0.5, 0.0, 0.2, 0.3, 0.1, 0.4]), np.array([9, 13, 9, 21, 13, 9])
+    times = 0.02 * np.arange(100), 5.0 + np.cumsum(np.resize([0.01, 0.03], 80))
+    some = [
+        stretch(t, np.outer(t, slopes), doubt=np.outer(t, doubts), spread=np.tile(spreads, (k, 1)))
+        for t, k in zip(times, (100, 80), strict=True)
+    ]
+    rate, error = filtered(some, counts, 0.02)
+    assert_allclose(rate, np.tile(slopes, (60 + 40, 1)), rtol=1e-6)
+    expected = []
+    for one in some:
+        inner = np.stack([rates(one.t, one.y, one.at, n).inner_gain for n in counts], axis=1)
+        expected.append(np.sqrt(inner * spreads + doubts**2))
+    assert_allclose(error, np.concatenate(expected), rtol=1e-4)
+
+
+def test_an_error_is_also_what_white_noise_leaves_and_two_orders_more_would_change() -> None:
+    """Noise of one column; another one bends so fast that the bias is most of its error."""
+    t = 0.02 * np.arange(400)
+    y = np.zeros((400, 6))
+    y[:, 2] = 0.1 * np.random.default_rng(11).normal(size=400)
+    y[:, 5] = np.sin(12.0 * t)
+    one = stretch(t, y)
+    rate, error = filtered([one], np.full(6, 13), 0.02)
+    assert not error[:, [0, 1, 3, 4]].any()
+    found = rates(t, y, one.at, 13)
+    assert (error[:, 2] / (0.1 * np.sqrt(found.gain))).min() == pytest.approx(1.0, abs=0.1)
+    off = rate[:, 5] - 12.0 * np.cos(12.0 * one.at)
+    shown, real = (np.sqrt((part**2).mean()) for part in (error[:, 5], off))
+    assert shown == pytest.approx(real, rel=0.2)
+    assert np.ptp(error[13:-13, 5]) < 0.2 * shown, 'it is smoothed over the window'

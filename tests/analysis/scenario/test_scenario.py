@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ import yaml
 
 from auv_analysis import load_scenario
 from auv_analysis.scenario import scenario as scenario_module
-from auv_analysis.scenario.scenario import Scenario, write_inputs
+from auv_analysis.scenario.scenario import Scenario, check_names, write_inputs
 from auv_analysis.studies.sweep import campaign
 from auv_dynamics import load_vehicle
 from auv_dynamics.files import yaml_files
@@ -93,22 +94,24 @@ def test_steps_are_counted_without_rounding(step, duration, steps, tmp_path) -> 
     assert scenario.step_ns * steps == round(duration * 1e9)
 
 
-@pytest.mark.parametrize('spelling', ['bare', 'beside', 'relative', 'absolute'])
+@pytest.mark.parametrize('spelling', ['bare', 'beside', 'no ending', 'relative', 'absolute'])
 def test_vehicle_is_found(spelling, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'vehicles').mkdir()
     text = shipped('vehicles', 'rexrov').read_text()
-    for name in ('vehicles/mine.yaml', 'case/mine.yaml'):
+    for name in ('vehicles/mine.yaml', 'case/mine.yaml', 'case/mine'):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
     vehicle, path = {
         'bare': ('rexrov', shipped('vehicles', 'rexrov')),
         'beside': ('mine.yaml', tmp_path / 'case/mine.yaml'),
+        'no ending': ('mine', tmp_path / 'case/mine'),
         'relative': ('../vehicles/mine.yaml', tmp_path / 'vehicles/mine.yaml'),
         'absolute': (str(tmp_path / 'vehicles/mine.yaml'), tmp_path / 'vehicles/mine.yaml'),
     }[spelling]
     scenario = loaded(tmp_path / 'case', vehicle=vehicle)
     assert scenario.vehicle_path.resolve() == path.resolve()
+    assert scenario.inputs == [tmp_path / 'case/scenario.yaml', scenario.vehicle_path]
     np.testing.assert_array_equal(scenario.vehicle.M, load_vehicle('rexrov').M)
     assert scenario.attachments['vehicle.yaml'] == text
 
@@ -270,6 +273,14 @@ def test_a_run_of_too_many_steps_is_refused(tmp_path: Path) -> None:
     assert loaded(tmp_path, step=1e-3, duration=1e4).steps == scenario_module.MOST_STEPS
     with pytest.raises(InputError, match='duration: expected at most 10000000 steps'):
         loaded(tmp_path, step=1e-3, duration=10000.001)
+
+
+@pytest.mark.parametrize('name', ['summary', 'gvc'])
+def test_no_controller_has_the_name_of_our_own_files(name: str, tmp_path: Path) -> None:
+    check_names(['gvc', name], tmp_path)
+    refused = pytest.raises(InputError, match=f'controllers: .* our own files, found {name}')
+    with refused if name == 'summary' else nullcontext():
+        check_names(['gvc', name], tmp_path, ('.npz', '.json'))
 
 
 def test_gains_of_every_controller_are_checked(tmp_path: Path) -> None:

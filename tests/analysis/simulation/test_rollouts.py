@@ -319,6 +319,7 @@ SLOW, FREE = {'lag': 0.05}, {'law': 'gvc', **LAWS['gvc'], 'anti_windup': False}
         ),
         ({'actuators': [SLOW, SLOW | {'limit': 60.0}]}, 'zoh', {'controllers': {'gvc': FREE}}),
         ({'faults': [[], [LOST]]}, 'zoh', {}),
+        ({'faults': [[], [LOST | {'kind': 'sensor_drop_out'}]]}, 'zoh', {}),
         ({'faults': [[LOST], [LOST | {'kind': 'sensor_drop_out'}]]}, 'zoh', {}),
         (
             {'vehicle': ['bluerov2', 'bluerov2_heavy']},

@@ -109,6 +109,22 @@ def test_law_that_numba_fails_on_in_any_way_runs_as_plain_python(
     assert type(error).__name__ in line
 
 
+@pytest.mark.parametrize(
+    ('lines', 'why'),
+    [
+        (['TypingError: first', 'other', 'UnsupportedError: dict of ints', 'File "law.py", line 7:',
+          'def wrench'], 'UnsupportedError: dict of ints, File "law.py", line 7'),
+        (['TypingError: first', '  LoweringError: Failed in step', '  no such type', 'later'],
+         'no such type'),
+        (['ValueError: ' + 200 * 'x'], 'ValueError: ' + 148 * 'x'),
+    ],
+)  # fmt: skip
+def test_why_numba_failed_is_what_its_innermost_error_says(lines, why):
+    kind, _, first = lines[0].partition(': ')
+    error = type(kind, (Exception,), {})('\n'.join([first, *lines[1:]]))
+    assert batch._why(error) == why
+
+
 @pytest.mark.long
 @needing('numba', JITTED)
 def test_the_template_of_a_law_is_compiled(tmp_path, monkeypatch, capsys):

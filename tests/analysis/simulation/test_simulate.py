@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.simulation.simulate import DivergedError, warm_up
+from auv_analysis.simulation.simulate import DivergedError, announce, warm_up
 from auv_dynamics import InputError
 from auv_dynamics.plant.disturbance import herman2018
 
@@ -228,6 +228,27 @@ def test_the_seed_decides_the_noise():
     ]  # fmt: skip
     np.testing.assert_array_equal(runs[0].nu, runs[1].nu)
     assert np.abs(runs[0].nu_measured - runs[2].nu_measured).max() > 0.005
+
+
+@pytest.mark.parametrize(
+    ('jitted', 'installed', 'cached', 'said'),
+    [
+        (True, True, True, ''),
+        (True, True, False, 'compiling the kernel for this machine, once ...\n'),
+        (False, True, False, 'numba is switched off: the kernel runs as plain Python, slower\n'),
+        (False, False, False, 'numba is not installed: the kernel runs as plain Python, slower\n'),
+    ],
+)
+def test_what_makes_a_kernel_slow_is_said(
+    jitted, installed, cached, said, tmp_path, monkeypatch, capsys
+):
+    (tmp_path / 'deep').mkdir()
+    (tmp_path / 'deep' / f'kernel.{"nbi" if cached else "nbc"}').touch()
+    told = {'JITTED': jitted, 'INSTALLED': installed, 'cache_folder': lambda: tmp_path}
+    for name, value in told.items():
+        monkeypatch.setattr(f'auv_analysis.simulation.simulate.{name}', value)
+    announce(load_scenario('case1'), ['gvc', 'cl'])
+    assert capsys.readouterr().err == said
 
 
 def works(seconds: float) -> None:

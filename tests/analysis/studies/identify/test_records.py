@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from auv_analysis.bag.tracks import Track, assembled
 from auv_analysis.studies.identify import identify as identifying
 from auv_analysis.studies.identify.bags import on_one_step, parts, without_constants
+from auv_analysis.studies.identify.couplings import signals_of
 from auv_analysis.studies.identify.identify import (
     HISTORY,
     Settings,
@@ -96,7 +97,7 @@ def test_nothing_to_learn_from_is_told():
     assert_allclose([(one.start, one.end) for (one,) in found], [(10, 11), (0, 30), (25, 30)])
     later = replace(record(20.0), start=40.0)
     later = replace(later, attitude_t=later.attitude_t + 40.0, velocity_t=later.velocity_t + 40.0)
-    found = parts([record(30.0), later], [(41.0, 43.0), (28.0, 45.0)])
+    found = parts([record(30.0), later], [(41.0, 43.0), (28.0, 45.0), (32.0, 36.0)])
     assert_allclose([(one.start, one.end) for one in found], [(28, 30), (41, 43), (40, 45)])
 
 
@@ -169,10 +170,12 @@ def test_a_vehicle_is_not_at_rest_where_one_recording_shows_it_move(size, at_res
     blind, seeing = (
         replace(one, velocity=1e-3 * one.velocity) for one in (record(9.0), record(9.0, seed=1))
     )
+    noise = np.where(np.arange(6) == 3, np.nan, 0.01)  # what nobody measured
+    blind.velocity[:, 3] = seeing.velocity[:, 3] = np.nan
     blind.velocity[:, 2], seeing.velocity[:, 2] = np.nan, size * np.resize([1.0, -1.0], 901)
     told = pytest.raises(InputError, match='at rest') if at_rest else nullcontext()
     with told:
-        check_motion([blind, seeing], np.full(9, 0.01))
+        check_motion([blind, seeing], noise)
 
 
 def test_a_segment_fits_into_a_record(herman, monkeypatch):
@@ -432,6 +435,47 @@ def test_the_length_of_a_segment_is_as_asked_and_what_is_kept_counts(herman, mon
     found = identify([herman.part(0.0, 20.0)], [], load_vehicle('herman2018'), few)
     assert len(found.problem.segments[0].command) * found.problem.step == pytest.approx(2.0)
     assert_allclose(np.diag(found.covariance), 700.0, atol=1.0)
+
+
+def shifted(one: Record, by: float) -> Record:
+    """The same at other times."""
+    return replace(one, start=one.start + by, attitude_t=one.attitude_t + by,
+                   velocity_t=one.velocity_t + by)  # fmt: skip
+
+
+def test_when_a_recording_began_changes_nothing():
+    """Times of a power of two have no rounding that would take another window of samples."""
+    vehicle, now = load_vehicle('herman2018'), record(15.0, 1.0 / 64.0)
+    later = shifted(now, 128.0)
+    u = unknowns(vehicle, speeds=np.full(6, 0.2), wrenches=np.full(6, 50.0))
+    (theta, late, _), (other, lag, _) = (least_squares_start([one], u) for one in (now, later))
+    assert late == lag
+    assert_allclose(other, theta, atol=1e-9)
+    assert_allclose(later.evenly()[:140], now.evenly()[:140], atol=1e-9)
+    before, after = (compared([one], held_of([one], HISTORY), vehicle) for one in (now, later))
+    for one, same in zip(before, after, strict=True):
+        # the black box learns from one sample more or less
+        within = 0.05 if one['predictor'] == 'black box' else 1e-6
+        assert same['error'] == pytest.approx(one['error'], rel=within)
+    for one, same in zip(*(segments_of(record, 2.0, 0.6) for record in (now, later)), strict=True):
+        assert same.begin == pytest.approx(one.begin + 128.0)
+        assert_allclose(same.start, one.start, atol=1e-9)
+        assert_array_equal(same.command, one.command)
+
+
+def test_velocity_and_command_of_a_coupling_are_of_one_moment():
+    """Of recordings of different lengths about as many samples each, at most a few thousand."""
+    some = []
+    for duration, begin in ((30.0, 5.0), (4.0, 50.0)):
+        one = shifted(record(duration), begin)
+        middles = one.start + 0.01 * (np.arange(len(one.command)) + 0.5)
+        ramps = one.velocity_t, middles
+        velocity, command = (np.outer(t, np.arange(1.0, 7.0)) for t in ramps)
+        some.append(replace(one, velocity=velocity, command=-command))
+    nu, tau = signals_of(SimpleNamespace(training=some))
+    assert len(nu) == 1000 + 400
+    assert_allclose(nu, -tau, rtol=1e-6)
+    assert_allclose(nu[[0, -1], 0], (5.005, 53.995), rtol=1e-6)
 
 
 def test_what_hardly_moves_is_not_searched():

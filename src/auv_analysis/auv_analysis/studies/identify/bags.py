@@ -90,7 +90,6 @@ def parts(records: Sequence[Record], spans: Sequence[tuple[float, float]]) -> li
     found = long_enough([
         record.part(max(begin, record.start), min(end, record.end))
         for record in records for begin, end in spans
-        if begin < record.end and end > record.start
     ])  # fmt: skip
     if not found:
         expected = f'a time up to {records[-1].end:g} s, for a second and more'

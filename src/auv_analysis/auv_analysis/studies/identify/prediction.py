@@ -86,9 +86,8 @@ def held_of(records: Sequence[Record], history: float) -> Held:
         n = int(np.ceil(reach / record.step - ON_STEP))
         firsts = np.arange(before, len(record.command) - n, max(round(spacing / record.step), 1))
         begins = record.start + record.step * firsts
-        starts = record.states(begins) if len(firsts) else np.zeros((0, 10))
         some = []
-        for first, begin, state in zip(firsts.tolist(), begins, starts, strict=True):
+        for first, begin, state in zip(firsts.tolist(), begins, record.states(begins), strict=True):
             command = record.command[first : first + n]
             times = horizons / record.step
             nan = np.full((len(horizons), 6), np.nan)
@@ -98,7 +97,7 @@ def held_of(records: Sequence[Record], history: float) -> Held:
                         float(begin))
             )  # fmt: skip
         found.append(some)
-        nu = record.states((begins[:, None] + horizons).ravel())[:, 4:] if some else np.zeros(0)
+        nu = record.states((begins[:, None] + horizons).ravel())[:, 4:]
         measured.append(nu.reshape(len(some), len(horizons), 6))
         number = ((begins - record.start) / min(BLOCK, total / FEWEST)).astype(int) + offset
         blocks.append(number)
@@ -173,8 +172,6 @@ class BlackBox:
         """Its prediction of what was held out."""
         found = []
         for record, segments in zip(held.record, held.segments, strict=True):
-            if not segments:
-                continue
             t = np.array([one.begin for one in segments])
             x, steps = self._state(record, t), round(float(held.horizons[-1]) / BOX_STEP)
             path = [x]

@@ -56,7 +56,7 @@ def test_vehicle_loads_and_explains_every_key(folder, capsys):
         assert word in text
     _without_marks(Path('mine.yaml'))
     assert yaml.safe_load(Path('mine.yaml').read_text())['sign'] == 'positive'
-    load_vehicle('mine.yaml')
+    assert load_vehicle('mine.yaml').name == 'mine'
 
 
 def test_scenario_loads_also_with_every_option(folder):
@@ -91,6 +91,19 @@ def test_law_and_its_scenario_run_as_they_are(folder):
     assert set(json.loads(Path('runs/my_own_law/summary.json').read_text())) == {'mine', 'gvc'}
 
 
+def test_all_that_is_written(folder, approved):
+    """Every key with what its schema says of it, and every option."""
+    assert _new('vehicle', 'mine.yaml') == 0
+    assert _new('scenario', 'trial', '--vehicle', 'rexrov') == 0
+    assert _new('law', 'pull_2.py', '--vehicle', 'mine.yaml') == 0
+    for name in ('mine.yaml', 'trial.yaml', 'pull_2.yaml'):
+        approved.add(Path(name).read_text().splitlines())
+    assert load_scenario('trial.yaml').vehicle.name == 'rexrov'
+    compared = load_scenario('pull_2.yaml')
+    assert (compared.name, compared.vehicle.name) == ('pull_2', 'mine')
+    assert compared.controllers['mine']['law'] == 'pull_2:Pull2'
+
+
 @pytest.mark.parametrize('kind', ['vehicle', 'scenario', 'law'])
 def test_nothing_is_overwritten(kind, folder, capsys):
     Path('mine.yaml').write_text('mine\n')
@@ -99,6 +112,14 @@ def test_nothing_is_overwritten(kind, folder, capsys):
     assert lines == ['mine.yaml: expected a name that is free here, found an existing file']
     assert [path.name for path in folder.iterdir()] == ['mine.yaml']
     assert Path('mine.yaml').read_text() == 'mine\n'
+
+
+def test_no_law_is_overwritten_either(folder, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(folder)
+    Path('mine.py').write_text('mine = 1\n')
+    assert _new('law', 'mine') == 2
+    assert capsys.readouterr().err.startswith('mine.py: expected a name that is free here')
+    assert [path.name for path in folder.iterdir()] == ['mine.py']
 
 
 @pytest.mark.parametrize(
@@ -132,4 +153,5 @@ def test_made_files_are_said_as_one_document(folder, capsys):
     assert _new('scenario', 'trial.yaml', '--json') == 0
     document = json.loads(capsys.readouterr().out)
     assert document['files'] == ['trial.yaml']
+    assert load_scenario('trial.yaml').vehicle.name == STARTING
     assert document['next'][0] == 'auv simulate trial.yaml'

@@ -1,6 +1,5 @@
 """Commented templates of a vehicle, a scenario and a law of one's own, made of the shipped ones."""
 
-import copy
 import importlib.util
 import json
 import keyword
@@ -121,7 +120,7 @@ def _lines(key: str, value: Any) -> Iterator[str]:
         yield f'{key}:'
         for entry in entries:
             yield from _block(f'  - {_flow(entry)}', [entry])
-    elif named and len(_flow(value)) > SHORT // 2:
+    elif named:
         yield f'{key}:'
         for name, entry in entries:
             yield from _block(f'  {name}: {_flow(entry)}', {name: entry})
@@ -174,7 +173,7 @@ def checked_name(kind: str, text: str) -> str:
 
 def vehicle_files(name: str) -> dict[str, str]:
     """File name -> text of a vehicle of one's own, with the numbers of a shipped one."""
-    data = copy.deepcopy(read_yaml(shipped('vehicles', STARTING), 'vehicle'))
+    data = read_yaml(shipped('vehicles', STARTING), 'vehicle')
     data |= {'name': name, 'source': f'the numbers of {STARTING}: say where yours come from'}
     about = (
         f'A vehicle of your own, with the numbers of {STARTING} to be replaced; SI units.',
@@ -199,9 +198,9 @@ def law_files(name: str, vehicle: str | None) -> dict[str, str]:
     path = shipped('laws', OWN_LAW)
     module = read_text(path.with_suffix('.py'), 'law')
     found = CLASS.search(module)
-    own = ''.join(word.capitalize() for word in name.split('_')) or name
+    own = ''.join(word.capitalize() for word in name.split('_'))
     shown = re.sub(rf'\b{found[1]}\b', own, module) if found else module
-    data: dict[str, Any] = copy.deepcopy(read_yaml(path, 'scenario'))
+    data = read_yaml(path, 'scenario')
     data |= {'name': name} | ({'vehicle': vehicle} if vehicle else {})
     load_vehicle(data['vehicle'])
     for entry in data['controllers'].values():

@@ -118,6 +118,15 @@ def test_an_attitude_that_is_zero_is_told_as_such() -> None:
     assert found['upright'].verdict == NOT_CHECKED
 
 
+def test_of_messages_without_finite_numbers_nothing_else_is_told() -> None:
+    x = motion()
+    x[:, 3] = np.nan
+    found = found_in(odometry_log(x))
+    for id in ('quaternion_norm', 'upright', 'depth'):
+        assert found[id].verdict == NOT_CHECKED
+        assert found[id].found in ('no message with finite numbers', 'no attitude')
+
+
 def test_w_first_reads_as_a_vehicle_on_its_back() -> None:
     x = motion(heading=0.3)
     x[:, 3:7] = np.roll(x[:, 3:7], 1, axis=1)

@@ -99,7 +99,11 @@ def test_a_vehicle_that_moves_already_gets_nothing_but_zero() -> None:
 
 @pytest.mark.parametrize(
     ('surge', 'yaw', 'word'),
-    [(0.54, 0.29, ''), (0.56, 0.0, '0.56 m/s or rad/s, more than 0.55'), (0.0, 0.31, 'than 0.3')],
+    [
+        (0.54, 0.29, ''),
+        (0.56, 0.0, '0.56 m/s or rad/s, more than 0.55'),
+        (0.2, 0.31, '0.31 m/s or rad/s, more than 0.3'),
+    ],
 )
 def test_a_drift_is_let_pass_and_leaves_the_turning_its_limit(surge, yaw, word: str) -> None:
     buffer = OdometryBuffer()

@@ -136,7 +136,8 @@ def test_only_failures_fail() -> None:
 def test_the_terminal_shows_each_failure_with_what_was_expected_and_advice() -> None:
     text = ' '.join(shown(listened(frames={('odom', 'base_link'): 500})).split())
     for words in (
-        "frames fail 'odom' and 'base_link'",
+        'Who is there odom_publisher pass',
+        "Frames and numbers frames fail 'odom' and 'base_link'",
         'expected: header.frame_id odom_ned',
         'frame_converter_node',
         'nothing is sent without --actuate',

@@ -12,7 +12,7 @@ from helpers.closed_loops import PAPER
 from numpy.testing import assert_allclose
 
 from auv_analysis import linearize, load_scenario, simulate
-from auv_analysis.studies.linearize.linearize import jacobian, state_names
+from auv_analysis.studies.linearize.linearize import jacobian, relative, state_names
 from auv_analysis.studies.linearize.modes import modes
 from auv_dynamics import load_vehicle
 from auv_dynamics.vehicle import DOFS
@@ -38,6 +38,12 @@ def test_derivatives_of_what_has_a_corner_in_its_slope():
     J, error = jacobian(lambda x: np.sin(50 * x), np.array([0.3]))
     assert abs(J[0, 0] - 50 * np.cos(15)) < 1e-4
     assert error[0, 0] > 1e-9  # what is not quadratic shows in the error
+
+
+def test_an_error_is_relative_to_the_largest_of_its_row_or_as_it_is_where_all_are_zero():
+    error = np.array([[0.2, 0.7], [3.0, 0.0]])
+    assert relative(error, np.array([[0.0, 0.0], [2.0, -6.0]])) == 0.7
+    assert relative(error, np.array([[0.0, 0.0], [2.0, -4.0]])) == 0.75
 
 
 @pytest.mark.parametrize(

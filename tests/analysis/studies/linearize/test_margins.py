@@ -263,6 +263,8 @@ def test_the_largest_gain_is_the_end_of_a_range_that_keeps_the_margins(
 
     def margins_of(scale, i, *_, delays):
         value = scale[i] if axis in (None, i) else pytest.fail('an axis that is not scaled')
+        if i != 4:  # which has more to spare
+            return SimpleNamespace(to_spare=9.0)
         return SimpleNamespace(to_spare=min(np.log(value / low) if low else 9.0, high / value - 1))
 
     asked = []

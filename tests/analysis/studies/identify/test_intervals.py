@@ -110,7 +110,10 @@ def test_residuals_are_not_white_under_a_disturbance(disturbed):
 
 
 def test_residuals_that_alternate_are_coloured_and_not_slow():
-    """Of e_k = w_k - w_k-1 / 2 the autocorrelation is -0.4 after one sample, then zero."""
+    """Of e_k = w_k - w_k-1 / 2 the autocorrelation is -0.4 after one sample, then zero.
+
+    Its power per frequency goes as 1.25 - cos(theta), of which 0.8 % lie below pi / 25.
+    """
     white = np.random.default_rng(0).normal(size=(2001, 9))
     e, segment = white[1:] - 0.5 * white[:-1], SimpleNamespace(nu=np.zeros((2000, 6)))
     segment.at = np.arange(2000.0)
@@ -118,7 +121,18 @@ def test_residuals_that_alternate_are_coloured_and_not_slow():
     assert [row['verdict'] for row in rows] == ['coloured'] * 6
     assert [row['largest'] for row in rows] == pytest.approx([-0.4] * 6, abs=0.1)
     assert_allclose([row['slow_if_white'] for row in rows], 1.0 / 25.0, rtol=0.05)  # Hz of Hz
-    assert all(row['slow'] < row['slow_if_white'] for row in rows)
+    assert [row['slow'] for row in rows] == pytest.approx([0.0081] * 6, abs=0.004)
+
+
+def test_what_is_constant_has_the_power_of_its_square_and_a_sine_half_of_it():
+    """The one lies below 1 Hz, the other one, at 5 Hz, above."""
+    t, sizes = 0.02 * np.arange(2000), np.linspace(0.5, 3.0, 6)
+    e = np.zeros((2000, 9))
+    e[:, :6] = 1.0 + np.outer(np.sin(2.0 * np.pi * 5.0 * t), sizes)
+    segment = SimpleNamespace(at=np.arange(2000.0), nu=np.zeros((2000, 6)))
+    rows = whiteness([(segment, e)], 0.02)
+    assert_allclose([row['rms'] for row in rows], np.sqrt(1.0 + sizes**2 / 2.0))
+    assert_allclose([row['slow'] for row in rows], 1.0 / (1.0 + sizes**2 / 2.0))
 
 
 def test_an_observer_makes_intervals_narrower_under_a_disturbance(disturbed):

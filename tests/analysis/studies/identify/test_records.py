@@ -60,6 +60,12 @@ def record(duration: float, step: float = 0.01, seed: int = 0) -> Record:
     return Record('x', t, np.tile(AHEAD, (n + 1, 1)), t, nu, step, command, 0.0)
 
 
+def shifted(one: Record, by: float) -> Record:
+    """The same at other times."""
+    return replace(one, start=one.start + by, attitude_t=one.attitude_t + by,
+                   velocity_t=one.velocity_t + by)  # fmt: skip
+
+
 def tracks(stamps: dict[str, np.ndarray]) -> dict[str, Track]:
     """A vehicle at rest, of which something is recorded at these stamps, ns."""
     return {
@@ -76,14 +82,11 @@ def test_four_equal_records_leave_no_empty_one(duration):
 
 
 def test_what_is_held_out_begins_where_the_share_does():
-    """The last 30 % of 4 s and of 6 s that begin at 10 s."""
-    one, other = record(4.0), record(6.0)
-    other = replace(
-        other, start=10.0, attitude_t=other.attitude_t + 10.0, velocity_t=other.velocity_t + 10.0
-    )
+    """The last 30 % of 4 s that begin at 3 s and of 6 s that begin at 10 s."""
+    one, other = shifted(record(4.0), 3.0), shifted(record(6.0), 10.0)
     training, held = split([one, other], 0.3)
     found = [(part.start, part.end) for part in (*training, *held)]
-    assert_allclose(found, [(0.0, 4.0), (10.0, 13.0), (13.0, 16.0)])
+    assert_allclose(found, [(3.0, 7.0), (10.0, 13.0), (13.0, 16.0)])
     assert_array_equal(held[0].command, other.command[300:])
 
 
@@ -95,9 +98,9 @@ def test_nothing_to_learn_from_is_told():
     spans = (10.0, 11.0), (-5.0, 40.0), (25.0, np.inf)
     found = [parts([record(30.0)], [span]) for span in spans]
     assert_allclose([(one.start, one.end) for (one,) in found], [(10, 11), (0, 30), (25, 30)])
-    later = replace(record(20.0), start=40.0)
-    later = replace(later, attitude_t=later.attitude_t + 40.0, velocity_t=later.velocity_t + 40.0)
-    found = parts([record(30.0), later], [(41.0, 43.0), (28.0, 45.0), (32.0, 36.0)])
+    found = parts(
+        [record(30.0), shifted(record(20.0), 40.0)], [(41.0, 43.0), (28.0, 45.0), (32.0, 36.0)]
+    )
     assert_allclose([(one.start, one.end) for one in found], [(28, 30), (41, 43), (40, 45)])
 
 
@@ -435,12 +438,6 @@ def test_the_length_of_a_segment_is_as_asked_and_what_is_kept_counts(herman, mon
     found = identify([herman.part(0.0, 20.0)], [], load_vehicle('herman2018'), few)
     assert len(found.problem.segments[0].command) * found.problem.step == pytest.approx(2.0)
     assert_allclose(np.diag(found.covariance), 700.0, atol=1.0)
-
-
-def shifted(one: Record, by: float) -> Record:
-    """The same at other times."""
-    return replace(one, start=one.start + by, attitude_t=one.attitude_t + by,
-                   velocity_t=one.velocity_t + by)  # fmt: skip
 
 
 def test_when_a_recording_began_changes_nothing():

@@ -91,15 +91,9 @@ def split(records: Sequence[Record], share: float) -> tuple[list[Record], list[R
     total = sum(record.end - record.start for record in records)
     left, first, last = total * (1.0 - share), [], []
     for record in records:
-        length = record.end - record.start
-        if length <= left:
-            first.append(record)
-        elif left <= 0:
-            last.append(record)
-        else:
-            first.append(record.part(record.start, record.start + left))
-            last.append(record.part(record.start + left, record.end))
-        left -= length
+        first.append(record.part(record.start, record.start + left))
+        last.append(record.part(record.start + left, record.end))
+        left -= record.end - record.start
     first, last = long_enough(first), long_enough(last)
     if not first:
         expected = 'a share that leaves a second with nine samples and more to learn from'

@@ -18,8 +18,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from auv_analysis.bag.any_bag import messages, survey
 from auv_analysis.bag.foreign_run import load_foreign
 from auv_analysis.bag.foreign_topics import read_mapping
-from auv_analysis.bag.mavlink_logs import PARAMETERS
+from auv_analysis.bag.mavlink_logs import PARAMETERS, too_slow
 from auv_analysis.bag.mavlink_presets import preset
+from auv_analysis.bag.metadata import TopicExtent
 from auv_analysis.bag.reading import BagContents
 from auv_analysis.cli.main import main
 from auv_analysis.runs.run import Run
@@ -122,6 +123,7 @@ def test_thrusters_are_those_that_the_parameters_name(run, pulses, tmp_path) -> 
     told += [logs.parameter(f'MOT_{m + 1}_DIRECTION', -1 if mirrored[m] else 1) for m in range(8)]
     told.append(logs.parameter('FRAME_CONFIG', 2))
     sent = [(logs.EPOCH, logs.VEHICLE, one) for one in told]
+    sent.append((logs.EPOCH, (7, 1), logs.parameter('FRAME_CONFIG', 4)))  # of another vehicle
     heard = [one for one in logs.telemetry(run, outputs) if 'DIRECTION' not in str(one[2])]
     log = logs.write_tlog(tmp_path / 'x.tlog', [*sent, *heard])
     proposed = yaml.safe_load(output('info', log)['mapping'])
@@ -171,12 +173,18 @@ def test_other_systems_are_left_out(run, pulses, tmp_path) -> None:
     log = logs.write_tlog(tmp_path / 'two.tlog', both)
     contents = survey(log)
     assert contents.counts['ATTITUDE'] == 200
-    assert sum('read system 1, component 1' in note for note in contents.notes) == 1
+    others = len(ghost) + sum(sender == logs.GROUND for _, sender, _ in both)
+    assert contents.notes == [
+        'two.tlog: read system 1, component 1, the most heard of 2 autopilots; left '
+        f'{others} messages of 2 other senders'
+    ]
     notes: list[str] = []
     assert len(list(messages(log, ['ATTITUDE', 'HEARTBEAT'], notes))) == 201
     silent = [one for one in both if 'HEARTBEAT' not in str(one[2])]
     with pytest.raises(InputError, match=r'heartbeats of the autopilot.* from 1\.1, 7\.1'):
         survey(logs.write_tlog(tmp_path / 'silent.tlog', silent))
+    alone = [one for one in silent if one[1] == logs.VEHICLE]
+    assert survey(logs.write_tlog(tmp_path / 'alone.tlog', alone)).counts['ATTITUDE'] == 200
 
 
 def test_messages_with_a_wrong_checksum_are_left_out_and_counted(run, pulses, tmp_path) -> None:
@@ -198,6 +206,9 @@ def test_each_port_and_named_value_is_a_topic(version: int, run, pulses, tmp_pat
         logs.mavlink.MAVLink_named_value_float_message(5, b'Depth', 1.0),
         logs.mavlink.MAVLink_named_value_float_message(5, b'CamTilt', 2.0),
     ]
+    if version == 2:  # whose types have numbers above 255
+        fours = [[i] * 4 for i in range(6)]
+        more.append(logs.mavlink.MAVLink_esc_telemetry_1_to_4_message(*fours))
     sent += [(last[0], logs.VEHICLE, one) for one in more]
     log = logs.write_tlog(tmp_path / 'x.tlog', sent, version)
     counts = survey(log).counts
@@ -206,6 +217,7 @@ def test_each_port_and_named_value_is_a_topic(version: int, run, pulses, tmp_pat
     assert servos == pulses[:20, 0].tolist()
     (tilt,) = messages(log, ['NAMED_VALUE_FLOAT[CamTilt]'], [])
     assert tilt.message.value == 2.0
+    assert counts.get('ESC_TELEMETRY_1_TO_4', 0) == version - 1
 
 
 def test_servo_outputs_keep_their_clock_when_it_wraps(run, pulses, tmp_path, monkeypatch) -> None:
@@ -241,7 +253,8 @@ def test_both_versions_of_mavlink_may_stand_in_a_log(run, pulses, tmp_path) -> N
 def test_time_of_an_onboard_log_is_that_of_gps(tmp_path) -> None:
     written = [
         logs.definitions(), logs.record(logs.GPS, 5_000_000, 0, 0, 0),  # no fix
-        logs.record(logs.GPS, 6_000_000, 432_000_250, 2288, 0),
+        logs.record(logs.GPS, 6_000_000, 432_000_250, 2288, 473_977_000),
+        logs.record(logs.GPS, 7_000_000, 432_002_250, 2288, 0),  # its clock has jumped
         logs.record(logs.ATT, 7_500_000, 0, 0, 0, 0, 0, 0, 0),
     ]  # fmt: skip
     log = tmp_path / 'x.bin'
@@ -250,6 +263,31 @@ def test_time_of_an_onboard_log_is_that_of_gps(tmp_path) -> None:
     # the fifth day of week 2288 is 2023-11-17, and GPS is 18 s ahead of UTC
     expected = np.datetime64('2023-11-16T23:59:42.250') + np.timedelta64(1500, 'ms')
     assert (topic, np.datetime64(stamp, 'ns')) == ('ATT', expected)
+    contents = survey(log)  # definitions have no time
+    assert (contents.first, contents.last) == (stamp - 2_500_000_000, stamp)
+    assert contents.counts['GPS'] == 3
+    fixes = [fix.message.Lat for fix in messages(log, ['GPS'], [])]
+    assert fixes == pytest.approx([0.0, 47.3977, 0.0])
+
+
+def test_sensors_are_told_apart_by_the_field_that_says_which(tmp_path) -> None:
+    """Whatever stands before it, if it is a byte, and where definitions are written again."""
+    types = [
+        (0x90, 'BARO', 'QBhfB', 'TimeUS,A,B,Press,I'), (0x91, 'WIDE', 'QHB', 'TimeUS,I,A'),
+    ]  # fmt: skip
+    told = logs.definitions((logs.FMT, logs.FMTU, *types), {'BARO': 's---#', 'WIDE': 's#'})
+    written = [
+        told, logs.record(types[0], 1, 7, 8, 0.5, 2), logs.definitions(types, {}),
+        logs.record(types[0], 2, 7, 8, 0.5, 3), logs.record(types[1], 3, 4, 5),
+    ]  # fmt: skip
+    log = tmp_path / 'x.bin'
+    log.write_bytes(b''.join(written))
+    counts = survey(log).counts
+    assert {topic: counts[topic] for topic in counts if topic[:3] != 'FMT'} == {
+        'BARO[2]': 1, 'BARO[3]': 1, 'WIDE': 1
+    }  # fmt: skip
+    (found,) = messages(log, ['BARO[3]'], [])
+    assert (found.log_time, found.message.Press) == (2000, 0.5)
 
 
 def test_slow_topics_are_named_with_what_raises_them(run, pulses, tmp_path) -> None:
@@ -262,6 +300,8 @@ def test_slow_topics_are_named_with_what_raises_them(run, pulses, tmp_path) -> N
         servos = next(note for note in said if note.startswith('SERVO_OUTPUT_RAW: 1 Hz'))
         assert 'SR0_RC_CHAN' in servos
         assert 'MAV_CMD_SET_MESSAGE_INTERVAL' in servos
+    for last, count, said in ((10**9, 10, 0), (10**9 + 1, 10, 1), (10**9, 1, 0), (10**9, 2, 1)):
+        assert len(too_slow('ATT', TopicExtent(0, last, count))) == said
     slow = tmp_path / 'x.BIN'
     slow.write_bytes(logs.onboard(run, pulses, 25))
     assert any('ATT: 2 Hz' in n and 'LOG_BITMASK' in n for n in survey(slow).notes)
@@ -304,6 +344,27 @@ def test_a_damaged_log_loses_what_is_damaged(log, every, seed, tmp_path) -> None
     assert any('bytes are no' in note for note in notes)
 
 
+@pytest.mark.parametrize('ending', ['.tlog', '.BIN'])
+def test_bytes_that_are_no_messages_are_counted_once(ending, run, pulses, tmp_path) -> None:
+    """Between messages, and a record whose time is none."""
+    path, part = tmp_path / f'x{ending}', run.part(slice(20))
+    if ending == '.tlog':
+        whole = logs.write_tlog(path, logs.telemetry(part, pulses[:20])).read_bytes()
+        second = logs.write_tlog(path, logs.telemetry(part, pulses[:20])[:1]).stat().st_size
+        late = b''
+    else:
+        whole, late = logs.onboard(part, pulses[:20]), logs.record(logs.ATT, 2**53, *[0] * 7)
+        second = len(logs.definitions())
+    path.write_bytes(whole[:second] + b'seven b' + late + whole[second:])
+    notes: list[str] = []
+    assert len(list(messages(path, ['ATTITUDE', 'ATT'], notes))) == 20
+    for said in (notes, survey(path).notes):
+        damage = [note for note in said if 'damaged' in note]
+        assert [note.partition(' bytes')[0] for note in damage] == [
+            f'x{ending}: damaged: {7 + len(late)}'
+        ]
+
+
 @cache
 def hostile() -> dict[str, bytes]:
     """Files that ask for too much, or for nothing at all."""
@@ -313,6 +374,7 @@ def hostile() -> dict[str, bytes]:
     unknown = logs.record(logs.FMT, 7, 12, 'ODD', 'Q?', 'TimeUS,x')
     itself = logs.record(logs.FMT, 0x80, 4, 'FMT', 'B', 'x')
     late = logs.record(logs.ATT, 2**63, 0, 0, 0, 0, 0, 0, 0)
+    fewer = logs.record(logs.FMT, 7, 12, 'ODD', 'QB', 'TimeUS')
     names = b''.join(
         logs.record(logs.FMT, 7, 4, f'A{i:03x}', 'B', 'x') + b'\xa3\x95\x07\x00'
         for i in range(11_000)
@@ -321,6 +383,7 @@ def hostile() -> dict[str, bytes]:
         'empty': b'', 'byte': b'\xfe', 'zeros': bytes(100_000), 'v1.tlog': b'\xfe' * 300_000,
         'v2.tlog': b'\xfd' * 300_000, 'noise': rng.bytes(200_000),
         'loop.BIN': head + empty + b'\xa3\x95\x07' * 1000, 'format.BIN': head + unknown * 50,
+        'fewer.BIN': head + fewer + b'\xa3\x95\x07' + bytes(9),
         'itself.BIN': head + itself + head, 'late.BIN': head + late * 20, 'names.BIN': names,
         'short.tlog': bytes(8) + b'\xfe\x00\x00\x01\x01\x00\xff\xff',
         'heads.BIN': b'\xa3\x95' * 50_000,

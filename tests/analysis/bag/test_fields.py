@@ -104,6 +104,19 @@ def test_a_definition_may_have_line_ends_of_windows() -> None:
     assert read(b'\0\1\0\0' + bytes(8) + np.float64(2.5).tobytes()).newton == 2.5
 
 
+def test_a_definition_may_be_idl() -> None:
+    text = ''
+    for name, fields in (
+        ('Level', 'double m;'), ('Depth', 'rov_msgs::msg::Level level; double rate;'),
+    ):  # fmt: skip
+        text += '=' * 80 + f'\nIDL: rov_msgs/msg/{name}\n'
+        text += f'module rov_msgs {{ module msg {{ struct {name} {{ {fields} }}; }}; }};\n'
+    found = decoder('rov_msgs/msg/Depth', text, 'idl', 'cdr')(
+        b'\0\1\0\0' + np.array([2.5, -1.5]).tobytes()
+    )
+    assert (found.level.m, found.rate) == (2.5, -1.5)
+
+
 @pytest.mark.parametrize(('name', 'unit', 'size'), [
     ('x', 'cm', 0.01), ('y', 'mm', 1e-3), ('z', 'ft', 0.3048), ('phi', 'deg', 0.01745329),
     ('u', 'cm/s', 0.01), ('v', 'mm/s', 1e-3), ('w', 'kn', 0.5144444), ('p', 'deg/s', 0.01745329),

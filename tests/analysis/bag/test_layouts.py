@@ -1,7 +1,9 @@
 """Bags that look like those of other systems: their topics, types, axes, clocks and containers."""
 
+import shutil
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -172,8 +174,33 @@ def test_files_of_a_killed_recorder_are_read_by_their_numbers(run, tmp_path) -> 
         next(part.glob('*.db3')).rename(bag / f'killed_{number}.db3')
     found = loaded(bag, odometry='/o', wrench='/w', frames='ned_fsd', step=0.01)
     assert found.samples == 3 * run.samples
-    assert survey(bag).counts == dict.fromkeys(topics, 3 * run.samples)
+    contents = survey(bag)
+    assert contents.counts == dict.fromkeys(topics, 3 * run.samples)
+    span = nanoseconds(seen.t[[0, -1]] + [3.0, 30.0]) + 2_000_000  # when they were logged
+    assert [contents.first, contents.last] == span.tolist()
     assert not any('jumps back' in note for note in found.notes)
+
+
+def test_files_that_were_compressed_as_a_whole(run, tmp_path, monkeypatch) -> None:
+    messages, keys = cola2(run, Maker())
+    bag = write(tmp_path / 'other', messages, Maker(), kind='sqlite3')
+    (file,) = bag.glob('*.db3')
+    packed = file.with_name(f'{file.name}.zstd')
+    packed.write_bytes(zstandard.ZstdCompressor().compress(file.read_bytes()))
+    size = file.stat().st_size
+    file.unlink()
+    told = yaml.safe_load((bag / 'metadata.yaml').read_text())
+    told['rosbag2_bagfile_information'] |= {
+        'compression_mode': 'FILE', 'compression_format': 'zstd',
+        'relative_file_paths': [packed.name],
+    }  # fmt: skip
+    (bag / 'metadata.yaml').write_text(yaml.safe_dump(told))
+    assert loaded(bag, **keys).samples == run.samples
+    monkeypatch.setattr(shutil, 'disk_usage', lambda _: SimpleNamespace(free=size))
+    assert sum(survey(bag).counts.values()) == 2 * run.samples
+    monkeypatch.setattr(shutil, 'disk_usage', lambda _: SimpleNamespace(free=size - 1))
+    with pytest.raises(InputError, match=f'at most the {size - 1} bytes .* found {size} bytes'):
+        survey(bag)
 
 
 def test_an_mcap_that_was_not_finished_is_read_as_far_as_it_goes(run, tmp_path) -> None:

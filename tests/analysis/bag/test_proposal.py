@@ -24,13 +24,14 @@ from numpy.testing import assert_allclose
 from rosbags.typesys import get_types_from_msg
 
 from auv_analysis.bag.any_bag import survey
+from auv_analysis.bag.csv_logs import Span
 from auv_analysis.bag.foreign_topics import (
     candidates,
     other_odometries,
     read_mapping,
     with_candidates,
 )
-from auv_analysis.bag.proposal import component_of, looked_through, proposal
+from auv_analysis.bag.proposal import Looked, component_of, looked_through, proposal, unit_of
 from auv_analysis.bag.reading import BagContents
 from auv_analysis.bag.step_topics import NotOursError
 from auv_analysis.cli import main
@@ -230,6 +231,114 @@ def test_names_of_fields(topic, path, component) -> None:
     assert component_of(topic, path) == component
 
 
+def test_words_for_vectors_and_their_axes() -> None:
+    words = {
+        'y': 'pos position pose usbl point local location',
+        'v': 'vel velocity linear dvl speed v', 'q': 'gyro angular rate rates omega gyroscope',
+        'Y': 'force f', 'M': 'torque moment', 'theta': 'rpy euler',
+        'qy': 'orientation quaternion quat q',
+    }  # fmt: skip
+    for component, kinds in words.items():
+        for kind in kinds.split():
+            found = [component_of('log', f'{kind}{axis}') for axis in ('_y', '[1]', '_east')]
+            assert found == [component] * 3, kind
+    for kind in ('accel', 'acceleration', 'acc', 'mag', 'magnetic', 'bias'):
+        assert not component_of('log', f'velocity.{kind}.y'), kind
+    axes = {'u': ('_x', '[0]', '_north'), 'w': ('_z', '[2]', '_down'), 'p': ('[3]',), 'r': ('[5]',)}
+    for component, ends in axes.items():
+        assert [component_of('log', f'vel{end}') for end in ends] == [component] * len(ends)
+    forces = [component_of('log', f'force[{i}]') for i in range(6)]
+    assert forces == [*'XYZKMN']
+    assert component_of('log', 'angvel_x') == 'p'
+
+
+def test_words_for_turns_and_ways() -> None:
+    turns = {'roll': 'phi', 'phi': 'phi', 'pitch': 'theta', 'theta': 'theta'}
+    turns |= dict.fromkeys(('yaw', 'psi', 'heading'), 'psi')
+    rates, moments = {'phi': 'p', 'theta': 'q', 'psi': 'r'}, {'phi': 'K', 'theta': 'M', 'psi': 'N'}
+    for turn, angle in turns.items():
+        paths = turn, f'{turn}rate', f'{turn}speed', f'tau_{turn}'
+        found = [component_of('log', path) for path in paths]
+        assert found == [angle, rates[angle], rates[angle], moments[angle]], turn
+    for word in ('rate', 'rates', 'speed', 'vel', 'velocity', 'dot', 'gyro', 'angular'):
+        assert component_of('log', f'yaw_{word}') == 'r', word
+    for word in ('force', 'torque', 'moment', 'tau', 'wrench'):
+        assert component_of('log', f'{word}_pitch') == 'M', word
+        assert component_of('log', f'{word}_heave') == 'Z', word
+    ways = [component_of('log', path) for path in ('surge', 'sway', 'heave', 'tau_sway')]
+    assert ways == ['u', 'v', 'w', 'Y']
+
+
+@pytest.mark.parametrize(('component', 'path', 'span', 'unit'), [
+    ('psi', 'yaw', (-6.6, 1.0), 'deg'), ('psi', 'yaw', (-6.4, 6.4), ''),
+    ('r', 'r', (0.0, 20.1), 'deg/s'), ('r', 'r', (-19.9, 19.9), ''),
+    ('phi', 'roll_degrees', (0.0, 1.0), 'deg'), ('p', 'gyro_x_dps', (0.0, 1.0), 'deg/s'),
+    ('p', 'gyro_x_degs', (0.0, 1.0), 'deg/s'), ('p', 'rate_x (deg)', (0.0, 1.0), 'deg/s'),
+    ('p', 'gyro_x_rads', (0.0, 90.0), ''), ('psi', 'yaw [rad]', (0.0, 90.0), ''),
+    ('u', 'vel_x_mms', (0.0, 90.0), 'mm/s'), ('x', 'pos_x [cm]', (0.0, 1.0), 'cm'),
+])  # fmt: skip
+def test_a_unit_is_said_or_seen_by_the_range(component, path, span, unit) -> None:
+    assert unit_of(component, path, Looked('csv', spans={path: Span(9, *span)})) == unit
+
+
+def test_a_unit_of_the_file_comes_before_that_of_a_name() -> None:
+    looked = Looked('csv', spans={'z_mm': Span(0, np.inf, -np.inf)}, units={'z_mm': 'ft'})
+    assert unit_of('z', 'z_mm', looked) == 'ft'
+    assert unit_of('psi', 'z_mm', looked) == ''
+
+
+def stamp_of(path: str, high: float = 2.0, count: int = 5, **more: Any) -> tuple[str, str]:
+    spans = {'u': Span(count, 0.0, 1e9), path: Span(count, 0.0, high)}
+    return Looked('csv', spans=spans, **more).stamp
+
+
+def test_a_time_is_found_by_its_name_and_its_unit_by_name_or_step() -> None:
+    for word in ('t', 'time', 'timestamp', 'stamp', 'sec', 'secs', 'seconds', 'clock'):
+        assert stamp_of(word) == (word, 's'), word
+    for path, unit in (
+        ('time_ms', 'ms'), ('time_us', 'us'), ('time_usec', 'us'), ('time_ns', 'ns'),
+        ('time_nsec', 'ns'), ('time_boot_ms', 'ms'), ('boot_time_s', 's'), ('time_sec', 's'),
+    ):  # fmt: skip
+        assert stamp_of(path, 4e9) == (path, unit)
+    assert stamp_of('t', 4e9, units={'t': 'ms'}) == ('t', 'ms')
+    for step, unit in (
+        (4.9, 's'), (5.0, 'ms'), (4999.0, 'ms'), (5000.0, 'us'), (4.9e6, 'us'), (5e6, 'ns')
+    ):  # fmt: skip
+        assert stamp_of('t', 4.0 * step) == ('t', unit)
+        assert stamp_of('t', 8.0 * step, share=0.5) == ('t', unit)
+    for none in (stamp_of('t', count=1), stamp_of('u_t'), stamp_of('t', stamped=True)):
+        assert none == ('', '')
+    looked = Looked('csv', spans={'time_ms': Span(3, 500.0, 2000.0)})
+    assert (looked.duration, Looked('csv').duration) == (1.5, None)
+
+
+@pytest.mark.parametrize(('low', 'high', 'curve'), [
+    (800.0, 2200.0, 't200_16v'), (799.0, 2200.0, None), (800.0, 2201.0, None),
+])  # fmt: skip
+def test_pulses_are_told_from_thrusts_by_their_range(low, high, curve) -> None:
+    motors = {'motor1': Span(9, low, 1000.0), 'motor2': Span(9, 900.0, high),
+              'motor3': Span(9, 0.0, 0.0), 'motor': Span(9, 1.0, 2.0)}  # fmt: skip
+    looked = {'a': Looked('csv', spans={'motor1': Span(9, 1.0, 2.0)}),
+              'b': Looked('csv', spans=motors)}  # fmt: skip
+    contents = BagContents(types=dict.fromkeys('ab', 'csv'), counts=dict.fromkeys('ab', 9))
+    found = yaml.safe_load(proposal(Path('x'), contents, looked))['thrusters']
+    more = {'curve': curve} if curve else {}
+    assert found == {'topic': 'b', 'fields': ['motor1', 'motor2'], **more}
+
+
+@pytest.mark.parametrize(('ids', 'line'), [
+    (('odom_ned', 'base_frd'), 'frames: ned_fsd'), (('map_enu', 'base_flu'), 'frames: enu_flu'),
+    (('odom_ned', 'base_flu'),
+     'frames: enu_flu    # the frame ids odom_ned, base_flu of /o contradict each other'),
+    ((), 'frames: enu_flu    # the names of /o do not say: a guess'),
+])  # fmt: skip
+def test_axes_are_those_that_the_frame_ids_name(ids, line) -> None:
+    kind = 'nav_msgs/msg/Odometry'
+    contents = BagContents(types={'/o': kind}, counts={'/o': 3})
+    text = proposal(Path('x'), contents, {'/o': Looked(kind, ids, stamped=True)})
+    assert line in text.splitlines()
+
+
 def test_how_sure_a_value_is_is_no_value() -> None:
     assert component_of('log', 'roll') == 'phi'
     for word in ['cov', 'covariance', 'std', 'stddev', 'var', 'variance', 'err', 'error', 'sigma']:
@@ -237,7 +346,8 @@ def test_how_sure_a_value_is_is_no_value() -> None:
 
 
 def test_pictures_alone_are_not_looked_at() -> None:
-    kinds = ('sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage')
+    names = 'Image', 'CompressedImage', 'PointCloud2', 'PointCloud', 'CameraInfo'
+    kinds = [f'sensor_msgs/msg/{name}' for name in names]
     contents = BagContents(types={f'/{i}': kind for i, kind in enumerate(kinds)})
     found = looked_through(Path('no bag'), contents)
     assert [(one.kind, one.spans) for one in found.values()] == [(kind, {}) for kind in kinds]

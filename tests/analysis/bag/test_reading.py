@@ -22,7 +22,8 @@ from helpers.strategies import examples
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
-from auv_analysis.bag import step_topics
+from auv_analysis.bag import chunks, step_topics
+from auv_analysis.bag.mcap_file import MAGIC
 from auv_analysis.bag.metadata import bag_files
 from auv_analysis.bag.reading import BagContents, read_bag
 from auv_dynamics.files.errors import InputError
@@ -234,13 +235,54 @@ def test_an_index_that_lies_is_not_believed(tmp_path: Path) -> None:
     good = path.read_bytes()
     entry = struct.pack('<QQ', 7 * STEP, 0)[:8]
     place = good.rindex(entry, 0, good.rindex(b'\x08', 0, len(good) - 100))
-    for lie in (0, 1, 10**6, 2**63, 2**64 - 1):
+    index = place - 7 * 16 - 15  # its record: opcode and length, channel, bytes of entries
+    assert good[index] == 7
+    size = struct.unpack_from('<Q', good, len(MAGIC) + good[8:].index(b'\x06') + 1)[0] - 40
+    lies = [('<Q', place + 8, lie) for lie in (0, 1, size - 30, size - 4, 10**6, 2**63, 2**64 - 1)]
+    lies += [('<I', index + 11, lie) for lie in (17, 24, 336, 2**32 - 16)]  # it has 320 bytes
+    for code, where, lie in lies:
         data = bytearray(good)
-        struct.pack_into('<Q', data, place + 8, lie)
+        struct.pack_into(code, data, where, lie)
         path.write_bytes(data)
         found = assert_equal_reading(path)
         assert isinstance(found, BagContents)
-        assert found.counts == {'/wrench': 20}
+        assert found.counts == {'/wrench': 20}, lie
+    path.write_bytes(good[: index + 15 + 5 * 16 + 3])  # cut in the index
+    assert_equal_reading(path)
+    assert read_bag(path).counts == {'/wrench': 20}
+
+
+def test_a_chunk_with_an_index_is_not_gone_through_record_by_record(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    walked, places = list[int](), chunks._places
+    monkeypatch.setattr(
+        chunks, '_places', lambda data, most: walked.append(len(data)) or places(data, most)
+    )
+    for index in (True, False):
+        bag = Bag(tmp_path / f'{index}.mcap', index=index, chunk_size=4000)
+        for k in range(40):
+            for role in ('wrench', 'cmd_vel'):
+                kind, data = message(role, k)
+                bag.add(f'/{role}', kind, k * STEP, data)
+        walked.clear()
+        assert read_bag(bag.close()).counts == {'/wrench': 40, '/cmd_vel': 40}
+        assert (max(walked) < 4000) == index, 'the definitions alone'
+
+
+def test_what_damage_costs_of_a_file(tmp_path: Path) -> None:
+    bag = Bag(tmp_path / 'bag.mcap', chunk_size=1)
+    for k in range(3):
+        kind, data = message('wrench', k)
+        bag.add('/wrench', kind, k * STEP, data)
+    good = bag.close().read_bytes()
+    bag.path.write_bytes(good[:8] + b'\0' + good[9:])  # the header: nothing tells what it is
+    assert 'expected an MCAP file' in str(assert_equal_reading(bag.path))
+    second = 8 + 9 + struct.unpack_from('<Q', good, 9)[0]
+    bag.path.write_bytes(good[:second] + b'\0' + good[second + 1 :])
+    found = assert_equal_reading(bag.path)
+    assert isinstance(found, BagContents)
+    assert found.notes == [f'bag.mcap: damaged from byte {second}, read up to there']
 
 
 def test_messages_without_a_channel_are_refused(tmp_path: Path) -> None:

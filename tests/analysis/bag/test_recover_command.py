@@ -25,9 +25,12 @@ from helpers.damaged_bags import (
     seen_by_rosbags,
     write_bag,
 )
-from mcap.records import Channel, Chunk, Message
+from helpers.made_messages import STRING, Bag, new, serialized
+from mcap.reader import make_reader
+from mcap.records import Channel, Chunk, Message, Schema
 from mcap.stream_reader import breakup_chunk
 
+from auv_analysis.bag import inspection
 from auv_analysis.bag import recover as recovery
 from auv_analysis.bag.inspection import Definitions, Spacing
 from auv_analysis.bag.metadata import Definition, FileExtent, metadata
@@ -37,6 +40,7 @@ from auv_analysis.bag.recover import recover
 from auv_analysis.bag.writer import BagWriter
 from auv_analysis.cli.main import main
 from auv_analysis.output import new_files
+from auv_dynamics.files.errors import FailedError
 
 
 def aged(bag: Path) -> Path:
@@ -104,7 +108,9 @@ def test_json_is_one_document(tmp_path: Path, capsys: pytest.CaptureFixture) -> 
     assert document['messages'] == len(messages_of(bag / 'bag_0.mcap'))
     assert document['attachments'] == sorted(ATTACHED)
     assert (file['messages_lost'], document['messages_lost']) == (None, None), 'who knows'
-    assert document['topics']['/odom']['spacing'] == {'gaps': 0, 'missing': 0, 'longest': []}
+    odom, remark = (document['topics'][topic] for topic in ('/odom', '/remark'))
+    assert odom['spacing'] == {'gaps': 0, 'missing': 0, 'longest': []}
+    assert (remark['spacing'], remark['type']) == (None, 'std_msgs/msg/String')
 
 
 def test_a_damaged_chunk_amid_others_leaves_a_gap_that_is_named(
@@ -132,6 +138,10 @@ def test_a_damaged_chunk_amid_others_leaves_a_gap_that_is_named(
     rows = [line.split() for line in out.splitlines()]
     assert ['/odom', str(kept), '1', str(len(stamps))] in rows
     assert command(capsys, bag)[0] == 0
+    with path.open('rb') as file:
+        (told,) = (m.metadata for m in make_reader(file).iter_metadata() if m.name == 'rosbag2')
+    metadata = yaml.safe_load(told['serialized_metadata'])['rosbag2_bagfile_information']
+    assert metadata['message_count'] == len(messages_of(path))
 
 
 def test_a_split_bag_with_a_damaged_file(tmp_path: Path) -> None:
@@ -144,6 +154,7 @@ def test_a_split_bag_with_a_damaged_file(tmp_path: Path) -> None:
     document = recover(bag).document()
     assert [f['state'] for f in document['files']] == ['healthy', 'repaired', 'healthy']
     assert document['topics']['/odom']['spacing']['gaps'] == 1
+    assert document['duration'] == 0.59
     after = contents(bag)
     assert {k: after[k] for k in ('bag_0.mcap', 'bag_2.mcap')} == {
         k: before[k] for k in ('bag_0.mcap', 'bag_2.mcap')
@@ -227,6 +238,62 @@ def test_a_metadata_yaml_agrees_by_files_counts_and_span() -> None:
         assert recovery._gist(other) != agrees
 
 
+def test_a_report_adds_up_its_files(tmp_path: Path) -> None:
+    for number, spans in enumerate(({'/a': (5, 9), '/b': (7, 12)}, {'/b': (13, 15)})):
+        bag = Bag(tmp_path / f'bag_{number}.mcap', chunk_size=1)
+        for topic, (first, last) in spans.items():
+            for k in range(first, last + 1):
+                bag.add(topic, STRING, k * STEP, serialized(new(STRING, 'x' * 50)))
+        data = bytearray(bag.close().read_bytes())
+        begin, end = [one[:2] for one in places(bytes(data)) if isinstance(one[2], Chunk)][1]
+        data[(begin + end) // 2] ^= 1  # the second message
+        bag.path.write_bytes(data)
+        old(bag.path)
+    seen = list[tuple[str, int, int]]()
+    document = recover(tmp_path, lambda *told: seen.append(told)).document()
+    assert (document['duration'], document['messages']) == (0.1, 12)
+    assert document['messages_lost'] == 2
+    assert [file['messages'] for file in document['files']] == [10, 2]
+    assert {topic: entry['messages'] for topic, entry in document['topics'].items()} == {
+        '/a': 4, '/b': 8
+    }  # fmt: skip
+    sizes = [(tmp_path / f'bag_{i}.mcap.damaged').stat().st_size for i in (0, 1)]
+    assert {what: (done, of) for what, done, of in seen} == {  # up to the footer
+        f'{what} bag_{i}.mcap': (size - 8, size)
+        for what in ('reading', 'repairing') for i, size in enumerate(sizes)
+    }  # fmt: skip
+
+
+def test_a_gap_is_one_from_half_a_usual_interval_more() -> None:
+    found = Spacing()
+    apart = [0, 10, 20, 20, 30, 31, 20, 35, *[0] * 6, -90, 90]  # ms; 4 of 8 that rise: up to 20
+    found.add(np.cumsum(apart) * 1_000_000)
+    gaps = found.gaps()
+    assert (gaps['gaps'], gaps['missing']) == (3, 1 + 1 + 3)
+    assert gaps['longest'] == [[0.076, 0.166], [0.08, 0.111], [0.131, 0.166]]
+
+
+def test_policies_are_read_up_to_a_size_of_all_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    texts = {'/a': '- {depth: 1}', '/b': '- {depth: 25}', '/c': '- {depth: 1}', '/d': 'depth: 1',
+             '/e': '- &a [*a]', '/f': '- ]'}  # fmt: skip
+    size = sum(map(len, texts.values()))
+    for more, last in ((0, [{'depth': 3}]), (-1, [])):
+        known = Definitions()
+        known.add(Schema(1, b'', 'ros2msg', 'X'), 0)
+        for i, (topic, text) in enumerate((texts | {'/g': '- {depth: 3}'}).items()):
+            about = {'offered_qos_profiles': text, 'topic_type_hash': f'{i}'}
+            known.add(Channel(i, topic, 'cdr', about, 1), 0)
+        known.add(Channel(9, '/a', 'cdr', {}, 1), 0)
+        monkeypatch.setattr(inspection, 'LARGEST_POLICIES', size + len('- {depth: 3}') + more)
+        found = known.of_rosbag2()
+        assert [one.qos for one in found] == [
+            [{'depth': 1}], [{'depth': 25}], [{'depth': 1}], [], [], [], last
+        ]  # fmt: skip
+        assert [(one.topic, one.digest) for one in found[:2]] == [('/a', '0'), ('/b', '1')]
+    known.add(Channel(10, '/j', 'json', {}, 1), 0)
+    assert known.of_rosbag2() is None
+
+
 def test_gaps_over_several_files_are_those_of_one() -> None:
     wide = [38 + k for k in range(12)]  # ms, beside 10; one message comes 3 ms late
     apart = [10] * 20 + [n for gap in wide for n in (gap, 10)] + [10, 13, -3, 10]
@@ -301,13 +368,20 @@ def wrong(folder: Path) -> dict[str, Path]:
     return {name: folder / name for name in names}
 
 
+FOUND = {
+    'empty': 'a folder without .mcap files', 'sqlite': 'a folder of .db3 files',
+    'text.mcap': 'what is no MCAP file', 'other.bag': 'a file that ends in \'.bag\'',
+    'linked': 'a link to', 'piped': 'something else', 'none': 'no such', 'none.mcap': 'no such',
+}  # fmt: skip
+
+
 def test_wrong_input_ends_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     for name, path in wrong(tmp_path).items():
         code, out, err = command(capsys, path)
         assert (code, out) == (2, ''), name
         assert len(err.splitlines()) == 1, err
         assert 'expected' in err
-        assert 'found' in err
+        assert f'found {FOUND[name]}' in err
     assert sorted(os.listdir(tmp_path / 'true')) == ['metadata.yaml', 'true_0.mcap']
 
 
@@ -339,6 +413,59 @@ def test_a_network_file_system(
     monkeypatch.setattr(fcntl, 'flock', flock)
     notes = recover(bag).document()['notes']
     assert notes == ([] if has_locks else ['bag_0.mcap: not locked: no locks available'])
+
+
+@pytest.mark.parametrize('refused', [errno.EACCES, errno.EPERM, errno.EROFS, errno.EIO])
+def test_a_file_that_may_only_be_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: int
+) -> None:
+    bag, opened = write_bag(tmp_path / 'bag'), os.open
+
+    def reading(path: Path, flags: int, *more: Any) -> int:
+        if flags & os.O_ACCMODE != os.O_RDONLY:
+            raise OSError(refused, os.strerror(refused), str(path))
+        return opened(path, flags, *more)
+
+    monkeypatch.setattr(os, 'open', reading)
+    if refused == errno.EIO:
+        with pytest.raises(FailedError, match=r'bag_0.mcap: .*the file is as it was'):
+            recover(bag)
+    else:
+        assert not recover(bag).changed
+
+
+def test_a_file_that_is_written_or_replaced_is_another(tmp_path: Path) -> None:
+    path, other = tmp_path / 'a', tmp_path / 'b'
+    states = []
+    for data, file in (('x', path), ('xy', path), ('xy', path), ('xy', other)):
+        file.write_text(data)
+        os.utime(file, ns=(0, 5 if len(states) < 2 else 6))
+        states.append(recovery.state(file))
+    assert len({*states}) == 4
+    other.replace(path)
+    assert recovery.state(path) == states[3]
+
+
+def test_a_repair_goes_on_from_the_damaged_file_that_was_kept_last(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'bag')
+    path = bag / 'bag_0.mcap'
+    whole = path.read_bytes()
+    path.unlink()
+    for end in ('', '.2', '.10'):
+        kept = bag / f'bag_0.mcap.damaged{end}'
+        kept.write_bytes(whole if end == '.10' else whole[:4000])
+        old(kept)
+    (file,) = recover(bag).files
+    assert (file.kept_as, file.inspection.count) == ('bag_0.mcap.damaged.10', 65)
+
+
+def test_a_link_that_is_named_itself_is_repaired(tmp_path: Path) -> None:
+    path, link = write_bag(tmp_path / 'bag') / 'bag_0.mcap', tmp_path / 'link.mcap'
+    left = cut(path)
+    link.symlink_to(path)
+    (file,) = recover(link).files
+    assert (file.state, path.read_bytes()) == ('repaired', left)
+    assert len(messages_of(link)) == file.inspection.count > 0
 
 
 def test_two_repairs_at_once(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

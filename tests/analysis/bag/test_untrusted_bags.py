@@ -3,19 +3,32 @@
 import os
 import resource
 import struct
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import lz4.frame
 import pytest
 import yaml
+import zstandard
 from helpers import costly_bags
 from helpers.damaged_bags import UPRIGHT, old
 from helpers.made_messages import TYPES, odometry, serialized, stamped
 from mcap.data_stream import RecordBuilder
 from mcap.exceptions import McapError
-from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Message, Schema
+from mcap.records import (
+    Attachment,
+    Channel,
+    Chunk,
+    DataEnd,
+    Footer,
+    Header,
+    Message,
+    Metadata,
+    Schema,
+)
 
 from auv_analysis import load_scenario
 from auv_analysis.bag import attachments, chunks, limits, mcap_file, metadata
@@ -106,11 +119,30 @@ def test_a_bomb_that_says_what_it_is_is_refused(
 @pytest.mark.usefixtures('little_memory')
 def test_a_bomb_that_lies_is_not_decompressed(tmp_path: Path, kind: str, says: bool) -> None:
     size = HUGE if kind == 'zstd' else limits.LARGEST_CHUNK
-    chunk = Chunk(kind, BOMBS[kind](size, says=says), 0, 0, 0, 1000)
+    chunk = Chunk(kind, BOMBS[kind](size, says=says), 0, 0, 0, 999)  # of nines: zeros are records
     path = write_chunk(tmp_path / 'bag' / 'bag_0.mcap', chunk)
     contents = read_bag(path.parent)
     assert contents.counts == {}
     assert f'damaged from byte {8 + len(record(Header("ros2", "harm")))}' in contents.notes[0]
+
+
+@pytest.mark.parametrize('kind', BOMBS)
+def test_a_chunk_need_not_say_how_much_it_holds(tmp_path: Path, kind: str) -> None:
+    held = b''.join(map(record, (Channel(1, '/a', 'cdr', {}, 0), Message(1, 0, b'abc', 0, 0))))
+    silent = zstandard.ZstdCompressor(write_content_size=False).compress(held)
+    packed = silent if kind == 'zstd' else lz4.frame.compress(held, store_size=False)
+    chunk = Chunk(kind, packed, 0, 0, zlib.crc32(held), len(held))
+    contents = read_bag(write_chunk(tmp_path / 'bag' / 'bag_0.mcap', chunk).parent)
+    assert (contents.counts, contents.notes) == ({'/a': 1}, [])
+
+
+def test_a_compressed_message_that_would_become_very_much_more_stays_as_it_is() -> None:
+    most, compress = 2 * MIB, zstandard.ZstdCompressor().compress
+    for data in (bytes(most), os.urandom(most + 1)):
+        assert limits.plain(compress(data)) == data
+    silent = zstandard.ZstdCompressor(write_content_size=False).compress(b'abc')
+    for packed in (compress(bytes(most + 1)), silent, compress(b'abc')[:-1], b'\0\1\0\0abc'):
+        assert limits.plain(packed) == packed
 
 
 @pytest.mark.parametrize('size', [0, HUGE, 1 << 62])
@@ -151,6 +183,8 @@ def test_records_that_are_too_long_are_refused(
     text = f'byte {len(head)}: expected a record of at most 1000 bytes, found 1001'
     with pytest.raises(InputError, match=text):
         read_bag(path)
+    path.write_bytes(head + struct.pack('<BQ', 0x80, 1000) + bytes(1000))
+    assert 'was not finished' in read_bag(path).notes[0]
 
 
 @pytest.mark.parametrize('kind', costly_bags.KINDS)
@@ -180,6 +214,57 @@ def test_a_long_recording_of_small_messages_is_no_hostile_one(indexed: bool) -> 
     counts = limits.Counts(messages * (16 + 4 if indexed else 4))  # bytes of index and payload
     for _ in range(messages // 1_500_000):  # chunks of 64 MiB
         counts.take(1_500_000, 100_000)
+
+
+def test_what_a_file_may_hold_grows_with_its_size() -> None:
+    counts = limits.Counts(1000)
+    counts.take((1 << 17) + 900, 16 * MIB + 7990)
+    assert counts.most == 100
+    counts.take(100, 10)
+    for more, text in (((1, 0), '132072 records'), ((0, 1), '16785216 bytes of definitions')):
+        with pytest.raises(limits.TooManyError, match=f'at most {text} in a file'):
+            counts.take(*more)
+    large = limits.Counts(1 << 30)
+    assert large.most == 1 << 21
+    large.take(1 << 21, 0)
+    with pytest.raises(limits.TooManyError, match='a chunk of at most 2097152 records'):
+        large.take((1 << 21) + 1, 0)
+
+
+def test_names_are_counted_once_and_by_their_kinds() -> None:
+    counts, most = limits.Counts(0), 10_000
+    kinds = {
+        'Attachment': lambda i: Attachment(0, 0, f'{i}', '', b''),
+        'Metadata': lambda i: Metadata(f'{i}', {}),
+        'Schema': lambda i: Schema(i, b'', '', 'x'),
+        'Channel': lambda i: Channel(i, '/x', '', {}, 1),
+    }
+    for i in range(most):
+        for make in kinds.values():
+            counts.note(make(i))
+        counts.note(Message(1, 0, b'', 0, 0))
+        counts.note(Channel(7, '/x', '', {}, 1))
+    for kind, make in kinds.items():
+        with pytest.raises(limits.TooManyError, match=f'at most {most} records of the kind {kind}'):
+            counts.note(make(most))
+
+
+def test_a_chunk_is_its_tables_and_definitions_in_their_order() -> None:
+    schema, channels = Schema(1, b'x', '', 'X'), [Channel(i, '/x', '', {}, 1) for i in (1, 2)]
+    other = struct.pack('<BQ', 0x80, 5) + bytes(5)  # of a kind that nobody knows
+    sent = [record(Message(i % 2 + 1, 9 - i, b'abc'[:i], 10 + i, i)) for i in range(4)]
+    head = [record(schema), record(channels[0])]
+    parts = [*head, *sent[:3], other, record(channels[1]), sent[3]]
+    taken = list[tuple[int, int]]()
+    counts = SimpleNamespace(most=9, take=lambda *told: taken.append(told))
+    first, second, table, third, last = chunks.contents_of(b''.join(parts), counts)
+    assert (first, second, third) == (schema, *channels)
+    assert taken == [(8, sum(map(len, [*head, other, record(channels[1])])))]
+    assert [table.payload(i) for i in range(3)] == [b'', b'a', b'ab']
+    assert (last.payload(0), last.log_times.tolist()) == (b'abc', [6])
+    assert (table.channels.tolist(), table.sequences.tolist()) == ([1, 2, 1], [0, 1, 2])
+    assert table.publish_times.tolist() == [10, 11, 12]
+    assert table.log_times.tolist() == [9, 8, 7]
 
 
 def test_a_schema_that_cannot_be_parsed_is_one_line(
@@ -216,21 +301,32 @@ def test_attachments_that_are_too_long_or_too_many(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(limits, 'LARGEST_ATTACHMENT', 100_000)
-    sizes = {'long': 200_000, 'first': 60_000, 'second': 30_000, 'third': 30_000}
-    items = [Attachment(0, 0, name, '', b'x' * size) for name, size in sizes.items()]
-    path = tmp_path / 'bag.mcap'
+    sizes = [('long', 200_000), ('first', 60_000), ('second', 30_000), ('third', 30_000),
+             ('first', 61_000)]  # fmt: skip
+    items = [Attachment(0, 0, name, '', b'x' * size) for name, size in sizes]
+    path = tmp_path / 'bag' / 'bag_0.mcap'
+    path.parent.mkdir()
     schema, channel = (
         Schema(1, b'string data\n', 'ros2msg', 'std_msgs/msg/String'),
         Channel(1, '/a', 'cdr', {}, 1),
     )
-    rest = [schema, channel, Message(1, 0, b'\0\1\0\0\0\0\0\0', 0, 0), DataEnd(0), Footer(0, 0, 0)]
-    head = [Header('ros2', 'harm'), *items]
-    path.write_bytes(MAGIC + b''.join(map(record, [*head, *rest])) + MAGIC)
-    contents = read_bag(path)
-    assert contents.attachments.keys() == {'first', 'second'}
+    rest = [schema, channel, Message(1, 0, b'\0\1\0\0\0\0\0\0', 0, 0)]
+    data = MAGIC + b''.join(map(record, [Header('ros2', 'harm'), *items, *rest]))
+    ending = record(DataEnd(zlib.crc32(data))) + record(Footer(0, 0, 0)) + MAGIC
+    path.write_bytes(data + ending)
+    sizes = [*sizes[1:3], ('more', 9000), ('last', 1001)]
+    more = [Attachment(0, 0, name, '', b'x' * size) for name, size in sizes]
+    data = MAGIC + b''.join(map(record, [Header('ros2', 'harm'), *more]))
+    path.with_name('bag_1.mcap').write_bytes(data + record(DataEnd(0)) + record(Footer(0, 0, 0)))
+    contents = read_bag(path.parent)
+    assert {name: len(text) for name, text in contents.attachments.items()} == {
+        'first': 60_000, 'second': 30_000, 'more': 9000
+    }  # fmt: skip
     assert contents.counts == {'/a': 1}
-    assert "attachment 'long' of 200000 bytes not read" in contents.notes[0]
-    assert "attachment 'third' not read, they are too many" in contents.notes[1]
+    long, third, last = contents.notes
+    assert "attachment 'long' of 200000 bytes not read" in long
+    assert "attachment 'third' not read, they are too many" in third
+    assert "attachment 'last' not read" in last
 
 
 def hostile(folder: Path, *, scenario: str = 'case1', bag: str = 'gvc') -> Path:

@@ -14,7 +14,7 @@ from helpers.shown import document_lines
 from auv_analysis.bag.step_topics import ACCEL, ODOMETRY, TWIST, WRENCH
 from auv_analysis.cli import main
 from auv_analysis.replay import compared as comparing
-from auv_analysis.replay.compared import compared, metrics_of, reproduction
+from auv_analysis.replay.compared import ask_law, compared, metrics_of, reproduction
 from auv_analysis.replay.open_loop import OpenLoop, open_loop, recorded_loop, recorded_settings
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import FailedError, InputError
@@ -154,6 +154,78 @@ def test_in_real_time_a_law_is_asked_while_it_was_in_charge(tmp_path: Path, told
     still = replace(loop, series={**loop.series, 'wrench': (both[0], 0.0 * both[1])})
     apart = reproduction(still, found)
     assert (apart.relative, apart.within) == (None, np.abs(found.tau).max())
+
+
+@pytest.mark.parametrize(('ramp', 'answers'), [(0.05, 15), (0.19, 29)])
+def test_a_law_that_takes_over_is_on_its_ramp_for_a_while(
+    tmp_path: Path, ramp: float, answers: int
+) -> None:
+    """Half as long again as it is, and half as many answers again as it has at least."""
+    loop = recorded_loop(write(tmp_path / 'bag.mcap', params={**REAL_TIME, 'ramp': ramp}))
+    ns, tau = loop.series['wrench']
+    tau = np.where(np.arange(COUNT)[:, None] < 6, 0.0, 1.0) * np.ones(6)  # its ramp begins with 0
+    found = open_loop(replace(loop, series={**loop.series, 'wrench': (ns, tau)}), 'gvc', GAINS)
+    assert np.array_equal(found.ns, ns[5:])
+    assert found.ramps.tolist() == [k < answers for k in range(COUNT - 5)]
+    assert found.notes[0].startswith('5 odometry messages left out')
+
+
+@pytest.mark.parametrize(('more', 'times'), [(0, 1), (1, 2)])
+def test_after_a_silence_that_a_watchdog_hears_a_law_begins_anew(
+    tmp_path: Path, more: int, times: int
+) -> None:
+    loop = recorded_loop(write(tmp_path / 'bag.mcap', params={**REAL_TIME, 'ramp': 0.05}))
+    series = {
+        role: (np.where(ns < 20 * STEP, ns, ns + 500_000_000 - STEP + more), x)
+        for role, (ns, x) in loop.series.items()
+    }
+    found = open_loop(replace(loop, series=series), 'gvc', GAINS)
+    assert np.count_nonzero(found.ramps) == 15 * times
+
+
+def test_a_law_is_in_charge_from_the_answer_before_its_first_estimate(tmp_path: Path) -> None:
+    loop = recorded_loop(write(tmp_path / 'bag.mcap', params=REAL_TIME))
+    ns, tau = loop.series['wrench'][0], np.ones((COUNT, 6))
+    f = np.where(np.arange(COUNT)[:, None] < 10, 0.0, np.eye(6)[2])
+    series = {**loop.series, 'wrench': (ns, tau), 'disturbance_estimate': (ns, f)}
+    found = open_loop(replace(loop, series=series), 'gvc', GAINS)
+    assert np.array_equal(found.ns, ns[9:])
+    series['disturbance_estimate'] = ns, 0.0 * f  # a law without one
+    assert len(open_loop(replace(loop, series=series), 'gvc', GAINS).ns) == COUNT
+
+
+def test_in_lock_step_only_rounding_is_a_reproduction(tmp_path: Path) -> None:
+    loop = recorded_loop(write(tmp_path / 'bag.mcap'))
+    found = open_loop(loop, 'gvc', GAINS)
+    same = replace(loop, series={**loop.series, 'wrench': (found.ns, found.tau)})
+    for size, holds in ((0.0, True), (5e-10, True), (2e-9, False)):
+        wrong = replace(found, tau=(1.0 + size) * found.tau)
+        assert reproduction(same, wrong).holds == holds, size
+
+
+def test_the_recorded_law_is_asked_again_where_it_is_known(tmp_path: Path) -> None:
+    def asked(law: str, given: dict, params: dict | None = None) -> tuple[list, dict]:
+        loop, told = recorded_loop(write(tmp_path / 'bag.mcap', params=params)), []
+
+        def ask(recorded, law, gains):
+            told.append((law, gains))
+            return open_loop(recorded, law, gains)
+
+        return told, ask_law(loop, law, given, ask)[0]
+
+    once, twice = ('gvc', GAINS), {**GAINS, 'k_D': 3.0}
+    assert asked('gvc', {})[0] == [once]
+    assert asked('gvc', {'k_D': 3.0})[0] == [('gvc', twice), once]
+    told, document = asked('cl', {'k_D': 3.0}, {'limits.speed': 0.2})
+    assert told == [('cl', twice), once]
+    assert (document['recorded']['law'], document['answered']['law']) == ('gvc', 'cl')
+    assert document['recorded']['gains'] == GAINS
+    assert document['notes'][-1].startswith(f'{document["not_used"]} messages without an answer')
+    for name, law in (('my.module:Law', 'my.module:Law'), (None, None)):
+        told, document = asked('gvc', GAINS, {'law': name})
+        assert (told, document['recorded']) == ([once], {'law': law, 'gains': {}})
+        assert (document['reproduced'], document['notes']) == (None, [])
+        assert document['reproduction'].startswith('reproduction not checked')
 
 
 def test_of_a_bag_that_was_not_finished_it_is_said(tmp_path: Path) -> None:

@@ -10,7 +10,8 @@ from helpers.strategies import examples
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
-from auv_analysis.replay.played_bag import index_bag, messages
+from auv_analysis.replay import played_bag
+from auv_analysis.replay.played_bag import PlayedTopic, index_bag, messages
 from auv_dynamics.files.errors import InputError
 
 TOPICS = ('/a', '/b', '/c')
@@ -98,8 +99,6 @@ def test_a_file_is_opened_when_its_time_has_come(tmp_path: Path, monkeypatch) ->
     write(tmp_path, [[(k * 10 + i, 0) for i in range(10)] for k in range(20)])
     index = index_bag(tmp_path)
     opened = []
-    from auv_analysis.replay import played_bag
-
     real = played_bag.McapFile
     monkeypatch.setattr(played_bag, 'McapFile', lambda p: (opened.append(p.name), real(p))[1])
     played = messages(index, TOPICS)
@@ -119,9 +118,19 @@ def test_a_bag_that_grows_is_played_up_to_where_it_was(tmp_path: Path) -> None:
     assert [one.ns for one in messages(index, TOPICS, end=index.last)] == list(range(known))
 
 
+def test_further_gaps_than_are_told_apart_are_none(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(played_bag, 'MOST_SPANS', 2)
+    write(tmp_path, [[(k * 100 * 10**9, 0) for k in range(4)]], chunk_size=1)
+    assert index_bag(tmp_path).gaps(['/a'], 0, 2**63) == [(0, 100 * 10**9)]
+
+
 def test_says_how_a_topic_was_recorded(tmp_path: Path) -> None:
-    write(tmp_path, [[(0, 0)]])
+    write(tmp_path, [[(2**31 * 10**9 - 1, 0)]])
+    text, known = '- {depth: 7}', 'RIHS01_7'
     bag = Bag(tmp_path / 'bag_1.mcap')
+    about = {'offered_qos_profiles': text, 'topic_type_hash': known}
+    channel = bag._writer.register_channel('/qos', 'cdr', 0, about)
+    bag._writer.add_message(channel, 0, b'\0\1\0\0', 0)
     schema = bag._writer.register_schema('std_msgs/msg/Header', 'ros2msg', b'uint8 x')
     channel = bag._writer.register_channel('/a', 'cdr', schema)
     bag._writer.add_message(channel, 0, b'\0\1\0\0', 0)
@@ -129,11 +138,15 @@ def test_says_how_a_topic_was_recorded(tmp_path: Path) -> None:
     index = index_bag(tmp_path)
     assert index.topics['/a'].kind == STRING
     assert index.clashes == {'/a'}
+    assert index.topics['/qos'] == PlayedTopic('', 'cdr', text, known)
 
 
 @pytest.mark.parametrize(
     ('files', 'words'),
-    [([[]], 'expected a bag with messages'), ([[(1 << 63, 0)]], 'what a ROS time can hold')],
+    [
+        ([[]], 'expected a bag with messages'),
+        ([[(2**31 * 10**9, 0)]], 'what a ROS time can hold, found 2147483648000000000 ns'),
+    ],
 )
 def test_refuses_what_cannot_be_played(tmp_path: Path, files: list, words: str) -> None:
     write(tmp_path, files)

@@ -83,11 +83,8 @@ def _thrusters(contents: BagContents, topic: str, stamp: Mapping[str, Any]) -> d
     if topic not in contents.types:
         return {}
     told = contents.metadata.get(PARAMETERS, {})
-    outputs = {}
-    for name, value in told.items():
-        servo = re.fullmatch(r'SERVO(\d+)_FUNCTION', name)
-        if servo and MOTOR <= float(value) < MOTOR + EIGHT:
-            outputs[int(float(value)) - MOTOR] = int(servo[1])
+    servos = ((re.fullmatch(r'SERVO(\d+)_FUNCTION', name), told[name]) for name in told)
+    outputs = {float(value) - MOTOR: int(servo[1]) for servo, value in servos if servo}
     count = MOTORS.get(told.get('FRAME_CONFIG', ''), EIGHT)
     order = [outputs.get(motor, motor + 1) for motor in range(count)]
     mirrored = [i + 1 for i in range(count) if told.get(f'MOT_{i + 1}_DIRECTION') == '-1']

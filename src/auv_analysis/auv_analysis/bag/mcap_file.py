@@ -159,7 +159,7 @@ class McapFile:
     ----------
     schemas, channels : id -> definition as far as `records` has come, of a channel the first
     size : bytes of the file
-    begins_well, ends_well : whether it begins and ends as an MCAP file does
+    begins_well, ends_well : whether it begins as an MCAP file does, and has the end of one
     faults : checksums of all data and of the summary that are not right, where damage is no end
 
     """
@@ -279,8 +279,8 @@ class McapFile:
     def _tail(self, place: int) -> Iterator[Lost]:
         """What stands behind the footer, where that is not the end of an MCAP file."""
         tail = self._bytes(place, len(MAGIC))
-        self.ends_well = tail == MAGIC and place + len(MAGIC) == self.size
-        if tail == MAGIC:
+        self.ends_well = tail == MAGIC
+        if self.ends_well:
             place += len(MAGIC)
             if self._resync and place < self.size:
                 yield Lost(place, self.size, 'another end')
@@ -414,9 +414,9 @@ class McapFile:
     def _next_proven(self, begin: int) -> Read | None:
         """The next chunk or attachment that proves itself, from a place on."""
         while begin < self.size:
-            window = self._bytes(begin, WINDOW + PREFIX.size)
+            window = self._bytes(begin, WINDOW + PREFIX.size - 1)
             for match in CANDIDATE.finditer(window):
-                cost = self._cost(begin + match.start()) if match.start() < WINDOW else None
+                cost = self._cost(begin + match.start())
                 if cost is None:
                     continue
                 self._budget -= cost
@@ -430,15 +430,13 @@ class McapFile:
 
     def _cost(self, place: int) -> int | None:
         """Bytes to look into at a candidate; None where the lengths in it do not add up."""
-        head = self._bytes(place, PREFIX.size + 64)
+        head = self._bytes(place, PREFIX.size + 64).ljust(PREFIX.size + 64, b'\0')
         opcode, length = PREFIX.unpack_from(head)
         if place + PREFIX.size + length > self.size:
             return None
         if opcode == Opcode.ATTACHMENT:
             named = int.from_bytes(head[PREFIX.size + 16 : PREFIX.size + 20], 'little')
             return int(length) if length >= 36 + named else None
-        if len(head) < PREFIX.size + CHUNK_HEAD.size + 8:
-            return None
         *_, size, _, named = CHUNK_HEAD.unpack_from(head, PREFIX.size)
         at = PREFIX.size + CHUNK_HEAD.size + named
         packed = int.from_bytes(head[at : at + 8], 'little')

@@ -117,7 +117,8 @@ class Looked:
     def stamp(self) -> tuple[str, str]:
         """Path to the time of messages without header, and its unit; '' where there is none."""
         for path, span in () if self.stamped or self.kind in PRESETS else self.spans.items():
-            words = [word for word in words_of(path) if word not in (*STAMP_UNITS, 'boot')]
+            own = [word for word in words_of(path) if word not in (*STAMP_UNITS, 'boot')]
+            words = own or words_of(path)  # `sec` is a unit, and a time by itself
             if words and words[0] in TIME_WORDS and span.filled > 1:
                 told = [*re.findall('[a-z]+', path.lower()), self.units.get(path, '')]
                 step = (span.high - span.low) / (span.filled - 1) * self.share

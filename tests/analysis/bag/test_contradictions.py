@@ -20,8 +20,20 @@ from helpers.foreign_bags import (
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import cumulative_trapezoid
 
+from auv_analysis.bag import foreign_checks
 from auv_analysis.bag.any_bag import survey
-from auv_analysis.bag.foreign_checks import acts_behind, contradictions, delays
+from auv_analysis.bag.foreign_checks import (
+    Delay,
+    _clear,
+    _least,
+    _together,
+    acts_behind,
+    behind,
+    contradictions,
+    delays,
+    doubts_of_motion,
+    misread_rates,
+)
 from auv_analysis.bag.foreign_topics import MappedTopic, TopicMap, candidates
 from auv_analysis.bag.foreign_tracks import _evenly
 from auv_analysis.bag.tracks import Track
@@ -124,6 +136,93 @@ def test_a_late_velocity_is_told_and_taken_off(run, tmp_path) -> None:
     assert not said(mended, 'behind the')
     truth = true_nu(run, mended)
     assert_allclose(mended.nu, truth, atol=2e-3)
+
+
+def along_east(speed: float, *surges: float, count: int = 400) -> list[Track]:
+    """Pose of a vehicle that heads east and moves so, and velocities along its bow."""
+    t, still = 0.05 * np.arange(count), np.zeros(count)
+    attitude = quaternion(np.stack([still, still, still + np.pi / 2], axis=1))
+    pose = np.column_stack([still, speed * t, still + 1.0, attitude])
+    twists = [np.column_stack([still + u, *[still] * 5]) for u in surges]
+    named = [('pose', pose), *(('twist', rows) for rows in twists)]
+    ns = nanoseconds(t)
+    return [Track(role, f'/{role}', ns, rows, np.inf, held=False) for role, rows in named]
+
+
+@pytest.mark.parametrize(('speed', 'told', 'other', 'is_doubtful'), [
+    (0.021, 0.0, 0.021, True), (0.019, 0.0, 0.019, False), (0.5, 0.5, 0.0, False),
+    (0.5, 0.71, 0.6, True), (0.5, 0.69, 0.6, False),  # off by 0.21 or 0.19, in place of 0.1
+])  # fmt: skip
+def test_a_frame_of_the_twist_is_doubted_where_the_other_one_fits_twice_as_well(
+    speed, told, other, is_doubtful
+) -> None:
+    tracks = along_east(speed, told, other)
+    for frame, right in (('child', 'world'), ('world', 'child')):
+        notes = doubts_of_motion(*tracks, frame)
+        assert len(notes) == is_doubtful
+        for note in notes:
+            assert f'with twist_frame {frame} the velocity differs' in note
+            assert f'by {abs(told - speed):.2g} m/s (RMS), with twist_frame {right} by' in note
+            assert note.endswith(f'{right} fits better')
+    assert doubts_of_motion(*along_east(0.5, 0.0, 0.5, count=8), 'child') == []
+    unknown = replace(tracks[0], rows=tracks[0].rows * np.where(np.arange(7) < 3, np.nan, 1.0))
+    assert doubts_of_motion(unknown, *tracks[1:], 'child') == []
+
+
+@pytest.mark.parametrize(('rate', 'share', 'said'), [
+    (0.1, 0.72, []), (0.1, 0.68, ['yaw 0.068 in place of 0.1 rad/s, 0.032 apart']),
+    (0.1, -0.72, ['yaw 0.072 in place of 0.1 rad/s, with the other sign']),
+    (0.021, 0.0, ['yaw 0 throughout in place of 0.021 rad/s']), (0.019, 0.0, []),
+])  # fmt: skip
+def test_rates_that_are_off_by_three_tenths_are_misread(rate, share, said) -> None:
+    t, still = 0.05 * np.arange(400), np.zeros(400)
+    attitude = quaternion(np.stack([still, still, rate * t], axis=1))
+    rates = np.column_stack([still * np.nan, still * np.nan, still + share * rate])
+    assert misread_rates(t, attitude, rates) == said
+
+
+@pytest.mark.parametrize(('size', 'is_told'), [(0.027, False), (0.03, True)])
+def test_a_velocity_below_that_of_rest_tells_no_delay(size, is_told) -> None:
+    t = 0.02 * np.arange(3000)
+    path = -size / 0.8 * np.cos(0.8 * t)
+    found = behind(t, path[:, None], size * np.sin(0.8 * (t - 0.2))[:, None])
+    assert (found is not None) == is_told
+    assert found is None or found.value == pytest.approx(0.2, abs=0.003)
+
+
+def test_a_delay_is_the_lowest_point_and_its_error_the_scatter_of_the_parts() -> None:
+    lowest = np.where(np.arange(20) < 10, 0.24, 0.44)  # s
+    found, least = _least(-1.0, lambda delay: 3.0 * (delay - lowest) ** 2, 6)
+    assert found is not None
+    assert (found.value, found.error) == pytest.approx((0.34, 0.1 / np.sqrt(20)))
+    assert least == pytest.approx(20 * 3.0 * 0.01)
+    for place in (-1.2, 1.2):  # beyond those that are tried
+        assert _least(-1.0, lambda delay, p=place: np.full(20, (delay - p) ** 2), 6)[0] is None
+
+
+@pytest.mark.parametrize(('value', 'error', 'is_told'), [
+    (0.031, 0.01, True), (-0.031, 0.01, True), (0.029, 0.01, False), (0.021, 0.0, True),
+    (0.019, 0.0, False), (0.5, 0.049, True), (0.5, 0.051, False),
+])  # fmt: skip
+def test_a_delay_is_told_where_it_is_no_chance_and_sharp(value, error, is_told) -> None:
+    assert _clear(Delay(value, error)) == (Delay(value, error) if is_told else None)
+
+
+def test_the_wrench_that_was_applied_is_the_one_that_is_late(monkeypatch) -> None:
+    pose, twist = along_east(0.5, 0.5)
+    monkeypatch.setattr(foreign_checks, 'acts_behind', lambda *_: Delay(0.2, 0.01))
+    forces = {role: replace(twist, role=role, topic=f'/{role}') for role in
+              ('wrench', 'wrench_applied')}  # fmt: skip
+    (note,) = delays({'pose': pose, 'twist': twist, **forces}, 'child')
+    assert note.startswith('/wrench_applied: the wrench acts 0.20 ± 0.01 s behind its stamps')
+
+
+def test_signals_are_compared_in_the_longest_time_without_a_gap() -> None:
+    one, other = (
+        Track('twist', '/t', np.array(ns), np.zeros((len(ns), 1)), 3.0, held=False)
+        for ns in ([0, 1, 2, 9, 10, 11, 12, 13, 14, 15], [8, 10, 13, 14, 22])
+    )
+    assert _together(one, other).tolist() == [9, 10, 11, 12, 13, 14]
 
 
 def planar(surge, yaw_rate, late: float, seed: int, frame: str = 'child', noise: float = 1.0):

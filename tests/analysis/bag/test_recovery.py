@@ -334,6 +334,17 @@ def test_without_chunks_a_damaged_message_costs_itself_alone(tmp_path: Path) -> 
     assert (document['messages'], document['files'][0]['state']) == (1, 'healthy')
 
 
+def test_a_message_is_not_believed_where_no_record_follows() -> None:
+    """Its length leads into the next one, to a zero."""
+    sent = [bytearray(bytes_of(said(k, b'abc'))) for k in (1, 2, 3)]
+    assert sent[2][2] == 0
+    struct.pack_into('<Q', sent[1], 1, len(sent[1]) - 9 + 2)
+    data = file_of(DEFINED, *sent)
+    rows, _, document = recovered(data)
+    assert rows == [('/a', 1, b'abc')]
+    assert losses(document) == [(data.index(sent[1]), len(data))]
+
+
 @pytest.mark.parametrize('compression', COMPRESSIONS)
 def test_the_next_chunk_is_found_wherever_it_begins(
     compression: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path

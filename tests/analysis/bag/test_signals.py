@@ -1,5 +1,6 @@
 """Stamps as bags have them: out of order, doubled, begun anew, missing, on another clock."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,14 @@ from auv_analysis.bag.foreign_messages import (
     read_sources,
 )
 from auv_analysis.bag.foreign_topics import MappedTopic, read_mapping
-from auv_analysis.bag.foreign_tracks import _on_one_clock, _retimed, _track
+from auv_analysis.bag.foreign_tracks import (
+    _on_one_clock,
+    _retimed,
+    _track,
+    axes_of,
+    with_rates,
+)
+from auv_analysis.bag.tracks import Track
 from auv_analysis.runs.run import Run
 from auv_dynamics.files.errors import InputError
 
@@ -100,6 +108,16 @@ def test_a_pause_makes_no_bursts() -> None:
     assert not notes
 
 
+@pytest.mark.parametrize(('short', 'count', 'said'), [
+    (20, 100, []), (21, 100, ['21 %']), (6, 12, ['50 %']), (6, 11, []),
+])  # fmt: skip
+def test_bursts_are_said_from_a_fifth_of_many_intervals_on(short, count, said) -> None:
+    apart = np.where(np.arange(count) < short, 1, 100) * 10**6
+    notes: list[str] = []
+    _retimed(recorded(np.cumsum([0, *apart])), notes)
+    assert [note.split('in bursts, ')[1][:4] for note in notes] == said
+
+
 def test_logged_times_are_put_on_another_clock() -> None:
     clock = recorded(np.arange(5) * SECOND, log=(100 + 2 * np.arange(5)) * SECOND)
     notes: list[str] = []
@@ -128,6 +146,42 @@ def test_logged_times_follow_the_stretch_of_the_clock_that_is_read() -> None:
 def test_no_line_leads_from_a_single_message() -> None:
     with pytest.raises(InputError, match=r'/wrench: expected at least 2 messages .*, found 1'):
         _track('wrench', recorded([1], 'wrench'), 'ned_fsd')
+    held = MappedTopic('wrench', '/wrench', between='hold')
+    assert _track('wrench', replace(recorded([1]), source=held), 'ned_fsd').held
+
+
+def test_the_rate_of_an_attitude_is_none_in_its_gaps() -> None:
+    t = np.r_[np.arange(0, 21), np.arange(40, 66)] * SECOND // 10
+    psi = 0.5 * t / SECOND
+    rows = np.column_stack([np.zeros((len(t), 3)), np.cos(psi / 2), np.zeros((len(t), 2)),
+                            np.sin(psi / 2)])  # fmt: skip
+    pose = Track('pose', '/p', t, rows, 0.5 * SECOND, held=False)
+    ns = np.arange(-3, 70) * SECOND // 10
+    twist = Track('twist', '/v', ns, np.arange(73.0)[:, None] * np.ones(6), np.inf, held=False)
+    notes: list[str] = []
+    found = with_rates(twist, pose, notes)
+    kept = np.r_[np.arange(3, 24), np.arange(43, 69)]
+    assert_array_equal(found.ns, ns[kept])
+    assert_array_equal(found.rows[:, 0], kept)
+    assert_allclose(found.rows[:, 3:], [[0, 0, 0.5]] * len(kept), atol=1e-9)
+    assert notes[0].startswith('/p: the angular velocity is the rate of its attitude')
+
+
+@pytest.mark.parametrize(('frames', 'ids', 'axes', 'said'), [
+    (None, ('odom_ned', 'base_frd'), 'ned_fsd', 0), (None, ('odom_ned', ''), 'ned_fsd', 0),
+    ('enu_flu', ('odom_ned', 'base'), 'enu_flu', 1), ('ned_fsd', ('odom_ned', 'x'), 'ned_fsd', 0),
+    ('ned_fsd', ('odom', 'base_flu'), 'ned_fsd', 1),
+])  # fmt: skip
+def test_axes_are_those_that_were_told_else_by_all_frame_ids(frames, ids, axes, said) -> None:
+    notes: list[str] = []
+    source = MappedTopic('twist', '/t', frames=frames)
+    one = replace(recorded([1, 2]), source=source, frame=ids[0], child=ids[1])
+    assert axes_of(one, notes) == axes
+    assert len(notes) == said
+    for named in (('odom_ned', 'base'), ('map_enu', 'base_flu'), ('', '')):
+        half = replace(one, source=MappedTopic('twist', '/t'), frame=named[0], child=named[1])
+        with pytest.raises(InputError, match='expected --frames ned_fsd or enu_flu'):
+            axes_of(half, [])
 
 
 def messages(run: Run) -> list:

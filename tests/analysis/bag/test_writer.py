@@ -232,6 +232,31 @@ def test_definitions_stand_outside_of_the_chunks(tmp_path: Path) -> None:
     assert document['topics']['/a']['messages'] > 5
 
 
+def test_a_definition_is_followed_by_all_it_contains_in_their_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    texts = {
+        'two/a_msgs/Top': 'uint8 KIND=1\n# Unused x\nInner[3] inner  # b_msgs/Unused y\n'
+                          'b_msgs/Far[<=2] far\nstring<=5 name\n  Inner again\n\n',
+        'two/a_msgs/Inner': 'float64 x\nb_msgs/Deep deep\n',
+        'one/b_msgs/Far': 'Deep deep\nbyte[] data\n', 'two/b_msgs/Far': 'Unused x\n',
+        'two/b_msgs/Deep': 'bool on\nwstring text\n',
+    }  # fmt: skip
+    for name, text in texts.items():
+        prefix, package, kind = name.split('/')
+        path = tmp_path / prefix / 'share' / package / 'msg' / f'{kind}.msg'
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    monkeypatch.setenv('AMENT_PREFIX_PATH', f'{tmp_path / "one"}:{tmp_path / "two"}')
+    line = '=' * 80
+    parts = [texts['two/a_msgs/Top'].rstrip()]
+    for name in ('two/a_msgs/Inner', 'one/b_msgs/Far', 'two/b_msgs/Deep'):
+        parts.append(f'{line}\nMSG: {name.partition("/")[2]}\n{texts[name].rstrip()}')
+    assert schema_text('a_msgs/msg/Top') == '\n'.join(parts) + '\n'
+    with pytest.raises(FileNotFoundError, match=r'a_msgs/msg/None.msg below .*one, .*two, '):
+        schema_text('a_msgs/msg/None')
+
+
 @pytest.mark.parametrize('kind', ['nav_msgs/msg/OccupancyGrid', 'sensor_msgs/msg/Imu'])
 def test_a_definition_holds_each_type_that_it_needs_once(kind: str) -> None:
     named = re.findall('^MSG: (.*)$', schema_text(kind), re.M)

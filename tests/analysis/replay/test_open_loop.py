@@ -349,6 +349,24 @@ def test_refuses_parameters_that_are_none(tmp_path: Path, params: dict) -> None:
         recorded_loop(write(tmp_path / 'bag.mcap', params=params))
 
 
+@pytest.mark.parametrize(('name', 'value', 'is_one'), [
+    ('setpoint_filter.omega', 20, True), ('setpoint_filter.omega', 20.1, False),
+    ('setpoint_filter.omega', 0.01, True), ('setpoint_filter.omega', 0.009, False),
+    ('ramp', 0, True), ('ramp', -0.1, False), ('ramp', True, False), ('ramp', np.inf, False),
+    ('setpoint_pairing', 'exact', True), ('setpoint_pairing', 'newest', False),
+    ('anti_windup', False, True), ('anti_windup', 1, False), ('limits.wrench', 5.0, False),
+])  # fmt: skip
+def test_a_parameter_is_of_its_type_and_within_its_range(name, value, is_one) -> None:
+    if is_one:
+        found = recorded_settings({name: value}, 'somewhere')
+        (field,) = (entry for entry in fields(found) if entry.metadata and name_of(entry) == name)
+        assert getattr(found, field.name) == value
+        assert type(getattr(found, field.name)) is {int: float}.get(type(value), type(value))
+    else:
+        with pytest.raises(InputError, match=f'^somewhere: {name}: expected '):
+            recorded_settings({name: value}, 'somewhere')
+
+
 def test_the_command_leaves_figures_and_refuses_a_taken_folder(tmp_path, capsys, approved) -> None:
     bag, out = write(tmp_path / 'bag.mcap'), tmp_path / 'out'
     command = ['replay', str(bag), '--law', 'cl', '--gain', 'k_D=1,2,3,4,5,6', '--out', str(out)]

@@ -1,0 +1,114 @@
+"""What the files that travel with a bag say of its run."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from auv_analysis import load_scenario
+from auv_analysis.bag import attachments
+from auv_analysis.bag.reading import BagContents
+from auv_analysis.scenario.fault_words import marks_of
+from auv_dynamics.files.errors import InputError
+
+BAG = Path('dives/harbour/bag')
+GAINS = {f'gains.{name}': [value] for name, value in
+         (('k_D', 12.0), ('k_I', 1.0), ('Lambda', 0.8), ('Gamma', 60.0))}  # fmt: skip
+
+
+def contents(**data: Any) -> BagContents:
+    """A bag with these attachments, `name.yaml`."""
+    texts = {f'{name}.yaml': yaml.safe_dump(value) for name, value in data.items()}
+    return BagContents(attachments=texts)
+
+
+def test_parameters_are_those_of_nodes_whatever_their_namespaces() -> None:
+    told = {
+        '/**/plant_node': {'ros__parameters': {'step': 0.01}},
+        '/auv1/controller_node': {'ros__parameters': {'law': 'gvc'}},
+        'recorder_node': {'ros__parameters': {}},
+    }
+    found = attachments.parameters_of(contents(params=told), BAG)
+    assert found == {'plant_node': {'step': 0.01}, 'controller_node': {'law': 'gvc'},
+                     'recorder_node': {}}  # fmt: skip
+    assert attachments.parameters_of(BagContents(), BAG) == {}
+    for wrong in ({'plant_node': 7}, {'plant_node': {'step': 0.01}}):
+        with pytest.raises(InputError, match=r'params.yaml: plant_node: expected a mapping with'):
+            attachments.parameters_of(contents(params=wrong), BAG)
+
+
+def test_a_control_period_is_a_positive_number() -> None:
+    assert attachments.step_of({}, BAG) is None
+    assert attachments.step_of({'plant_node': {}}, BAG) is None
+    found = attachments.step_of({'plant_node': {'step': 1}}, BAG)
+    assert (found, type(found)) == (1.0, float)
+    for wrong in (0, -0.01, math.inf, math.nan, '0.01'):
+        with pytest.raises(InputError, match='plant_node: step: expected a positive number'):
+            attachments.step_of({'plant_node': {'step': wrong}}, BAG)
+
+
+@pytest.mark.parametrize(('recorded', 'name'), [
+    ('runs/dive 7/gvc', 'gvc'), ('runs/my law,(2)', 'my_law_2_'), ('runs/.-_+x-y', 'x-y'),
+    ('x' * 101, 'x' * 100), ('.' + 'x' * 101, 'x' * 99), ('..', 'controller'), (None, 'bag'),
+])  # fmt: skip
+def test_a_controller_is_called_as_the_folder_it_was_recorded_into(recorded, name) -> None:
+    parameters = {'recorder_node': {'bag': recorded} if recorded else {}}
+    assert attachments.controller_name(parameters, BAG) == name
+    with pytest.raises(InputError, match='recorder_node: bag: expected a folder, found 7'):
+        attachments.controller_name({'recorder_node': {'bag': 7}}, BAG)
+
+
+def test_a_law_has_the_gains_that_were_written_with_it() -> None:
+    six = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    told = {'law': 'gvc', **GAINS, 'gains.k_D': six, 'ramp': 0.2}
+    found = attachments.law_and_gains(told, BAG)
+    assert found == ('gvc', {'k_D': six, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0})
+    assert attachments.law_and_gains(GAINS, BAG) == ('unknown', {})
+    assert attachments.law_and_gains({'law': 'a.b:My_law', **GAINS}, BAG) == ('a.b:My_law', {})
+    (note,) = attachments.notes_on('a.b:My_law')
+    assert note.startswith('gains of a.b:My_law not looked at')
+    assert attachments.notes_on('gvc') == []
+    for wrong in ({'law': 'a b:Law'}, {'law': 'gvc'}, {'law': 'gvc', **GAINS, 'gains.k_P': [1.0]}):
+        with pytest.raises(InputError, match=r'params.yaml: controller_node: expected'):
+            attachments.law_and_gains(wrong, BAG)
+
+
+def test_a_vehicle_is_the_one_that_is_given_else_that_of_the_bag() -> None:
+    bag = contents(vehicle=load_scenario('case1').vehicle_data)
+    own = attachments.vehicle_of(bag, BAG, None)
+    assert own.name == load_scenario('case1').vehicle_data['name']
+    assert attachments.vehicle_of(bag, BAG, 'rexrov').name == 'rexrov' != own.name
+    with pytest.raises(InputError, match=r'vehicle.yaml: expected an attachment, or --vehicle'):
+        attachments.vehicle_of(BagContents(), BAG, None)
+
+
+def test_faults_are_those_of_a_scenario_that_is_one() -> None:
+    case = load_scenario('faults_bluerov2_heavy')
+    vehicle = attachments.vehicle_of(contents(vehicle=case.vehicle_data), BAG, None)
+    text = case.attachments['scenario.yaml']
+    found = attachments.faults_of(BagContents(attachments={'scenario.yaml': text}), vehicle)
+    assert found == marks_of(yaml.safe_load(text)['faults'], vehicle) != ()
+    assert attachments.faults_of(BagContents(), vehicle) == ()
+    wrong = yaml.safe_load(text) | {'duration': 'long'}
+    assert attachments.faults_of(contents(scenario=wrong), vehicle) == ()
+
+
+def test_kinds_of_disturbances_are_known_where_a_scenario_is() -> None:
+    assert attachments.kinds_of(BagContents(), BAG) is None
+    for told, kinds in (
+        ({}, []), ({'disturbance': {'kind': 'harmonic'}}, ['harmonic']), ({'disturbance': []}, []),
+        ({'disturbance': [{'kind': 'step'}, 'odd', {'offset': 1}, {'kind': 'noise'}]},
+         ['noise', 'step']),
+    ):  # fmt: skip
+        assert attachments.kinds_of(contents(scenario=told), BAG) == {*kinds}
+
+
+def test_a_scenario_has_its_own_name_else_that_of_the_folder_around() -> None:
+    assert attachments.scenario_name(BagContents(), BAG) == 'harbour'
+    for name in ('case1', 'a.b_c-d+1', 'x' * 100):
+        assert attachments.scenario_name(contents(scenario={'name': name}), BAG) == name
+    for name in ('_x', 'x' * 101, 'a b', None, 7):
+        with pytest.raises(InputError, match=r'scenario.yaml: name: expected a word'):
+            attachments.scenario_name(contents(scenario={'name': name}), BAG)

@@ -183,6 +183,10 @@ def test_other_systems_are_left_out(run, pulses, tmp_path) -> None:
     silent = [one for one in both if 'HEARTBEAT' not in str(one[2])]
     with pytest.raises(InputError, match=r'heartbeats of the autopilot.* from 1\.1, 7\.1'):
         survey(logs.write_tlog(tmp_path / 'silent.tlog', silent))
+    usual = survey(logs.write_tlog(tmp_path / 'usual.tlog', heard)).notes
+    others -= len(ghost)
+    assert usual == [f'usual.tlog: read system 1, component 1; left {others} messages of 1 other '
+                     'senders']  # fmt: skip
     alone = [one for one in silent if one[1] == logs.VEHICLE]
     assert survey(logs.write_tlog(tmp_path / 'alone.tlog', alone)).counts['ATTITUDE'] == 200
 
@@ -274,17 +278,20 @@ def test_sensors_are_told_apart_by_the_field_that_says_which(tmp_path) -> None:
     """Whatever stands before it, if it is a byte, and where definitions are written again."""
     types = [
         (0x90, 'BARO', 'QBhfB', 'TimeUS,A,B,Press,I'), (0x91, 'WIDE', 'QHB', 'TimeUS,I,A'),
+        (0x92, 'FLAT', 'QB', 'TimeUS,A'),
     ]  # fmt: skip
-    told = logs.definitions((logs.FMT, logs.FMTU, *types), {'BARO': 's---#', 'WIDE': 's#'})
+    units = {'BARO': 's---#', 'WIDE': 's#-', 'FLAT': 's-'}
+    told = logs.definitions((logs.FMT, logs.FMTU, *types), units)
     written = [
         told, logs.record(types[0], 1, 7, 8, 0.5, 2), logs.definitions(types, {}),
         logs.record(types[0], 2, 7, 8, 0.5, 3), logs.record(types[1], 3, 4, 5),
+        logs.record(types[2], 4, 6),
     ]  # fmt: skip
     log = tmp_path / 'x.bin'
     log.write_bytes(b''.join(written))
     counts = survey(log).counts
     assert {topic: counts[topic] for topic in counts if topic[:3] != 'FMT'} == {
-        'BARO[2]': 1, 'BARO[3]': 1, 'WIDE': 1
+        'BARO[2]': 1, 'BARO[3]': 1, 'WIDE': 1, 'FLAT': 1
     }  # fmt: skip
     (found,) = messages(log, ['BARO[3]'], [])
     assert (found.log_time, found.message.Press) == (2000, 0.5)
@@ -388,6 +395,7 @@ def hostile() -> dict[str, bytes]:
         'short.tlog': bytes(8) + b'\xfe\x00\x00\x01\x01\x00\xff\xff',
         'heads.BIN': b'\xa3\x95' * 50_000,
         'instance.BIN': head + logs.record(logs.FMTU, 0, 0x85, '#' * 16, '') * 9 + itself,
+        'beyond.BIN': head + logs.record(logs.FMTU, 0, 0x84, '-' * 15 + '#', ''),
     }  # fmt: skip
 
 

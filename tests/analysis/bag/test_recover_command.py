@@ -446,17 +446,20 @@ def test_a_file_that_is_written_or_replaced_is_another(tmp_path: Path) -> None:
     assert recovery.state(path) == states[3]
 
 
-def test_a_repair_goes_on_from_the_damaged_file_that_was_kept_last(tmp_path: Path) -> None:
+@pytest.mark.parametrize('last', ['.2', '.10'])
+def test_a_repair_goes_on_from_the_damaged_file_that_was_kept_last(
+    tmp_path: Path, last: str
+) -> None:
     bag = write_bag(tmp_path / 'bag')
     path = bag / 'bag_0.mcap'
     whole = path.read_bytes()
     path.unlink()
-    for end in ('', '.2', '.10'):
+    for end in {'', '.2', last}:
         kept = bag / f'bag_0.mcap.damaged{end}'
-        kept.write_bytes(whole if end == '.10' else whole[:4000])
+        kept.write_bytes(whole if end == last else whole[:4000])
         old(kept)
     (file,) = recover(bag).files
-    assert (file.kept_as, file.inspection.count) == ('bag_0.mcap.damaged.10', 65)
+    assert (file.kept_as, file.inspection.count) == (f'bag_0.mcap.damaged{last}', 65)
 
 
 def test_a_link_that_is_named_itself_is_repaired(tmp_path: Path) -> None:

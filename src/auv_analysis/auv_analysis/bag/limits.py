@@ -151,6 +151,6 @@ def plain(message: bytes) -> bytes:
         return message
     with suppress(zstandard.ZstdError):
         most = max(LARGEST_DECODED, DENSEST * len(message))
-        if 0 <= zstandard.frame_content_size(message) <= most:
+        if zstandard.frame_content_size(message) <= most:  # below zero: it does not say
             return zstandard.ZstdDecompressor().decompress(message)
     return message

@@ -83,7 +83,6 @@ class Rewriter:
                 self._channel(channel.id)
             if definitions is not None:
                 text = as_text(metadata(definitions, [known.extent(self._name)]))
-                self._writer.flush()
                 self._writer.add_metadata(ROSBAG2, {'serialized_metadata': text})
             self._writer.finish()
             synced(file)

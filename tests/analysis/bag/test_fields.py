@@ -156,6 +156,9 @@ def test_numbers_are_those_of_a_message_itself_and_no_truth_values() -> None:
     assert list(numbers(message)) == [('few[0]', 2.0), ('few[1]', 3.0)]
     with pytest.raises(FieldError, match='on, which is bool'):
         MessageReader('pose', {'z': 'on'}, {}, None)(message)
+    with pytest.raises(FieldError, match='text, which is str') as refusal:
+        MessageReader('pose', {'z': 'few[0]'}, {}, ('text', 's'))(message)
+    assert refusal.value.key == 'stamp'
 
 
 def test_rows_of_nothing_and_of_absurd_numbers_are_of_no_use() -> None:

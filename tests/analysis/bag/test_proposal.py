@@ -318,12 +318,30 @@ def test_a_time_is_found_by_its_name_and_its_unit_by_name_or_step() -> None:
 def test_pulses_are_told_from_thrusts_by_their_range(low, high, curve) -> None:
     motors = {'motor1': Span(9, low, 1000.0), 'motor2': Span(9, 900.0, high),
               'motor3': Span(9, 0.0, 0.0), 'motor': Span(9, 1.0, 2.0)}  # fmt: skip
+    more = {f'motor{i}': Span(9, 1.0, 2.0) for i in (1, 2)}
     looked = {'a': Looked('csv', spans={'motor1': Span(9, 1.0, 2.0)}),
-              'b': Looked('csv', spans=motors)}  # fmt: skip
-    contents = BagContents(types=dict.fromkeys('ab', 'csv'), counts=dict.fromkeys('ab', 9))
+              'b': Looked('csv', spans=motors), 'c': Looked('csv', spans=more)}  # fmt: skip
+    contents = BagContents(types=dict.fromkeys('abc', 'csv'), counts=dict.fromkeys('abc', 9))
     found = yaml.safe_load(proposal(Path('x'), contents, looked))['thrusters']
-    more = {'curve': curve} if curve else {}
-    assert found == {'topic': 'b', 'fields': ['motor1', 'motor2'], **more}
+    by = {'curve': curve} if curve else {}
+    assert found == {'topic': 'b', 'fields': ['motor1', 'motor2'], **by}
+
+
+@pytest.mark.parametrize('names', [
+    ('x y z qw qx qy qz', 'roll pitch yaw'), ('x y z roll pitch yaw', 'qw qx qy qz'),
+    ('qw qx qy qz roll pitch yaw', 'x y z'),
+])  # fmt: skip
+def test_an_attitude_is_proposed_once(names) -> None:
+    looked = {
+        topic: Looked('csv', spans={name: Span(9, 0.1, 0.2) for name in listed.split()})
+        for topic, listed in zip('ab', names, strict=True)
+    }
+    contents = BagContents(types=dict.fromkeys('ab', 'csv'), counts=dict.fromkeys('ab', 9))
+    found = yaml.safe_load(proposal(Path('x'), contents, looked))['pose']
+    entries = found if isinstance(found, list) else [found]
+    fields = {name for entry in entries for name in entry['fields']}
+    turns = {*'xyz', 'qw', 'qx', 'qy', 'qz'}, {*'xyz', 'phi', 'theta', 'psi'}
+    assert fields == turns['x y z roll' in names[0]]
 
 
 @pytest.mark.parametrize(('ids', 'line'), [

@@ -336,10 +336,9 @@ def _thrusters(known: Sequence[str], looked: Mapping[str, Looked]) -> list[dict[
     for topic, one in looked.items():
         if topic in known:
             return [{'topic': topic}]
-        paths = [path for path, span in one.spans.items()
+        paths = [path for path in one.spans
                  if set(words_of(f'{topic} {path}')) & set(THRUSTING)
-                 and re.search(r'\d', path) and span.filled and (span.low or span.high)
-                 and not one.is_dead([path])]  # fmt: skip
+                 and re.search(r'\d', path) and not one.is_dead([path])]  # fmt: skip
         if len(paths) > len(best):
             best, where = paths, topic
     if not best:

@@ -19,15 +19,16 @@ from helpers.damaged_bags import (
 )
 from helpers.made_messages import STRING, TYPES, serialized
 from helpers.patience import patience
+from mcap.reader import make_reader
 
 from auv_analysis.bag import output
 from auv_analysis.bag import writer as writer_module
 from auv_analysis.bag.metadata import Definition
-from auv_analysis.bag.output import LEAST_SIZE, Storage
+from auv_analysis.bag.output import LEAST_SIZE, BagFile, Storage
 from auv_analysis.bag.reading import read_bag
 from auv_analysis.bag.recover import recover
 from auv_analysis.bag.ros2msg import schema_text
-from auv_analysis.bag.writer import BagWriter, RecordingError
+from auv_analysis.bag.writer import BagWriter, FileHealth, RecordingError
 
 PATIENCE = patience(20.0)  # s
 
@@ -206,6 +207,106 @@ def test_a_topic_that_begins_a_file_and_falls_silent(
         writer.write('/b', k * STEP, said(''))
     writer.close()
     assert len(list((tmp_path / 'bag').glob('*.mcap'))) == 3
+
+
+@pytest.mark.parametrize(('pace', 'telling', 'other'), [('', '/a', '/b'), ('/b', '/b', '/a')])
+def test_one_topic_says_when_a_file_is_full(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pace: str, telling: str, other: str
+) -> None:
+    file = BagFile(tmp_path / 'x.mcap', {}, Storage(max_duration=100, pace=pace))
+    for topic in ('/a', '/b'):
+        file.define(Definition(topic, STRING), 'string data')
+    assert not file.is_full(telling, 10**9, 5), 'nothing is in it'
+    for topic in ('/a', '/b'):
+        file.write(topic, 1000, said(''))
+    for ns, is_full in ((1099, False), (1100, True), (901, False), (900, True)):
+        assert file.is_full(telling, ns, 5) == is_full
+        assert not file.is_full(other, ns, 5)
+    assert not file.is_full('/new', 5000, 5), 'its first message'
+    monkeypatch.setattr(output, 'SILENCE', -1.0)
+    assert file.is_full(other, 1100, 5)
+    file.finish()
+
+
+def test_a_file_is_full_where_the_next_message_would_not_fit(tmp_path: Path) -> None:
+    file = BagFile(tmp_path / 'x.mcap', {}, Storage('none', max_size=50_000))
+    file.define(Definition('/a', STRING), 'string data')
+    assert not file.is_full('/a', 0, 10**9)
+    file.write('/a', 0, bytes(10_000))
+    assert file.is_full('/a', 0, 41_000)
+    assert not file.is_full('/a', 0, 33_000)
+    file.write('/a', 0, bytes(33_000))
+    file.finish()
+    assert (tmp_path / 'x.mcap').stat().st_size <= 50_000
+
+
+def test_attachments_say_what_they_are(tmp_path: Path) -> None:
+    writer = BagWriter(tmp_path / 'bag', dict.fromkeys(('a.yaml', 'b.yml', 'c.txt'), 'x'))
+    writer.close()
+    with writer.path.open('rb') as file:
+        found = {one.name: one.media_type for one in make_reader(file).iter_attachments()}
+    yaml_type = 'application/yaml'
+    assert found == {'a.yaml': yaml_type, 'b.yml': yaml_type, 'c.txt': 'text/plain'}
+
+
+class FakeFile:
+    """A file on a disk that runs full."""
+
+    def __init__(self) -> None:
+        self.output, self.path, self.lost = self, 'x.mcap', ''
+        self.position, self.free, self.looks = 0, 1600, 0
+
+    def loss(self) -> str:
+        return self.lost
+
+    def free_space(self) -> int:
+        self.looks += 1
+        return self.free
+
+
+def test_space_is_looked_at_after_each_sixteenth_of_what_shall_stay_free() -> None:
+    health, file = FileHealth(1600), FakeFile()
+    for position, looks in ((100, 0), (101, 1), (201, 1), (202, 2), (101, 3)):
+        file.position = position
+        health.follow(file)
+        assert file.looks == looks
+    assert not health.trouble
+    file.free = 1599
+    health.check(file)
+    told = 'x.mcap: 1599 bytes free on its file system, storage.free_space asks for 1600'
+    assert health.trouble == told
+    assert not health.broken, 'it can be finished'
+    file.free = 5
+    health.check(file)
+    assert health.trouble == told
+    carefree = FileHealth(0)
+    file.position = 10**9
+    carefree.follow(file)
+    carefree.check(file)
+    assert not carefree.trouble
+
+
+def test_what_fails_ends_a_recording_and_only_some_of_it_its_file() -> None:
+    file = FakeFile()
+    for error, final, broken, told in (
+        (OSError(5, 'Input/output error'), False, True, 'x.mcap: input/output error'),
+        (OSError(5, 'Input/output error', 'y'), False, True, 'y: input/output error'),
+        (ValueError('odd\nlines'), False, False, 'x.mcap: ValueError: odd'),
+        (ValueError('odd'), True, True, 'x.mcap: ValueError: odd'),
+    ):
+        health = FileHealth(0)
+        health.fail(file, error, final=final)
+        assert (health.trouble, health.broken, health.displaced) == (told, broken, False)
+    health = FileHealth(0)
+    health.fail(file, ValueError('first'))
+    health.fail(file, ValueError('second'))
+    assert health.trouble.endswith('first')
+    health.refuse_broken()
+    file.lost = 'removed'
+    health.check(file)
+    assert (health.trouble, health.broken, health.displaced) == ('x.mcap: removed', True, True)
+    with pytest.raises(RecordingError, match='removed'):
+        health.refuse_broken()
 
 
 def test_a_folder_with_a_bag_is_not_written_to(tmp_path: Path) -> None:

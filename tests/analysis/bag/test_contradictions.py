@@ -190,6 +190,14 @@ def test_a_velocity_below_that_of_rest_tells_no_delay(size, is_told) -> None:
     assert found is None or found.value == pytest.approx(0.2, abs=0.003)
 
 
+@pytest.mark.parametrize(('seconds', 'is_told'), [(7.8, False), (8.2, True)])
+def test_six_seconds_between_the_latest_delays_tell_one(seconds, is_told) -> None:
+    t = np.arange(0.0, seconds, 0.02)
+    path = -np.cos(0.8 * t) / 0.8
+    found = behind(t, path[:, None], np.sin(0.8 * (t - 0.2))[:, None])
+    assert (found is not None) == is_told
+
+
 def test_a_delay_is_the_lowest_point_and_its_error_the_scatter_of_the_parts() -> None:
     lowest = np.where(np.arange(20) < 10, 0.24, 0.44)  # s
     found, least = _least(-1.0, lambda delay: 3.0 * (delay - lowest) ** 2, 6)

@@ -23,6 +23,7 @@ from helpers.made_messages import Bag, new, serialized
 from numpy.testing import assert_allclose
 from rosbags.typesys import get_types_from_msg
 
+from auv_analysis.bag import proposal as proposing
 from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.csv_logs import Span
 from auv_analysis.bag.foreign_topics import (
@@ -95,6 +96,7 @@ def test_an_odometry_of_zeros_is_left_out_and_said(run, tmp_path) -> None:
     assert keys['odometry'] == {'topic': '/nav/odometry'}
     assert keys['setpoint'] == {'topic': '/cmd_vel'}
     assert '# /nav2/odometry: an odometry as well\n' in text
+    assert text.count('an odometry as well') == 1
     assert '# /rov/odom: no attitude or no velocity in it but zeros\n' in text
     assert 'frames: enu_flu    # the frame ids odom, base_link of /nav/odometry do not say' in text
 
@@ -363,12 +365,42 @@ def test_how_sure_a_value_is_is_no_value() -> None:
         assert not component_of('log', f'roll_{word}'), word
 
 
-def test_pictures_alone_are_not_looked_at() -> None:
-    names = 'Image', 'CompressedImage', 'PointCloud2', 'PointCloud', 'CameraInfo'
-    kinds = [f'sensor_msgs/msg/{name}' for name in names]
-    contents = BagContents(types={f'/{i}': kind for i, kind in enumerate(kinds)})
-    found = looked_through(Path('no bag'), contents)
-    assert [(one.kind, one.spans) for one in found.values()] == [(kind, {}) for kind in kinds]
+def test_pictures_and_points_are_not_looked_at(monkeypatch) -> None:
+    names = 'Image', 'CompressedImage', 'PointCloud2', 'PointCloud', 'CameraInfo', 'Imu'
+    asked: list[str] = []
+    monkeypatch.setattr(
+        proposing, 'messages', lambda bag, topics, *_: asked.extend(topics) or iter(())
+    )
+    contents = BagContents(types={f'/{name}': f'sensor_msgs/msg/{name}' for name in names})
+    found = looked_through(Path('bag'), contents)
+    assert asked == ['/Imu']
+    assert [(topic, one.kind, one.spans) for topic, one in found.items()] == [
+        (topic, kind, {}) for topic, kind in contents.types.items()
+    ]
+
+
+@pytest.mark.parametrize(('topics', 'share'), [(1, 0.997), (50, 0.997), (100, 0.5)])
+def test_of_many_topics_fewer_messages_are_looked_at(topics, share, monkeypatch) -> None:
+    asked: dict[str, float] = {}
+    monkeypatch.setattr(proposing, 'messages', lambda *told: asked.update(told[3]) or iter(()))
+    kinds = dict.fromkeys((f'/{i}' for i in range(topics)), 'sensor_msgs/msg/Imu')
+    counts = dict.fromkeys(kinds, 1000) | {'/0': 2}
+    found = looked_through(Path('bag'), BagContents(types=kinds, counts=counts))
+    assert asked == dict.fromkeys(kinds, share) | {'/0': 1.0}
+    assert {topic: one.share for topic, one in found.items()} == asked
+
+
+@pytest.mark.parametrize(('columns', 'units'), [
+    ('pos_x [cm],roll [deg],pitch [deg],yaw [deg]',
+     {'x': 'cm', 'phi': 'deg', 'theta': 'deg', 'psi': 'deg'}),
+    ('pos_x [cm],pos_y [mm]', {'x': 'cm', 'y': 'mm'}), ('pos_x [cm],pos_y [cm]', 'cm'),
+    ('pos_x [cm],pos_y', {'x': 'cm'}), ('pos_x [m]', None),
+])  # fmt: skip
+def test_units_are_one_word_where_that_says_it_all(columns, units) -> None:
+    looked = Looked('csv', spans={name: Span(9, 0.1, 0.2) for name in columns.split(',')})
+    contents = BagContents(types={'a': 'csv'}, counts={'a': 9})
+    found = yaml.safe_load(proposal(Path('x'), contents, {'a': looked}))['pose']
+    assert found.get('units') == units
 
 
 def test_info_shows_columns_and_the_mapping(run, tmp_path, capsys) -> None:

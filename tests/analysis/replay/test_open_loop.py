@@ -156,27 +156,32 @@ def test_in_real_time_a_law_is_asked_while_it_was_in_charge(tmp_path: Path, told
     assert (apart.relative, apart.within) == (None, np.abs(found.tau).max())
 
 
-@pytest.mark.parametrize(('ramp', 'answers'), [(0.05, 15), (0.19, 29)])
+@pytest.mark.parametrize(
+    ('ramp', 'answers', 'silenced'), [(0.05, 15, 0), (0.16, 24, 0), (0.05, 15, 1)]
+)
 def test_a_law_that_takes_over_is_on_its_ramp_for_a_while(
-    tmp_path: Path, ramp: float, answers: int
+    tmp_path: Path, ramp: float, answers: int, silenced: int
 ) -> None:
     """Half as long again as it is, and half as many answers again as it has at least."""
     loop = recorded_loop(write(tmp_path / 'bag.mcap', params={**REAL_TIME, 'ramp': ramp}))
     ns, tau = loop.series['wrench']
     tau = np.where(np.arange(COUNT)[:, None] < 6, 0.0, 1.0) * np.ones(6)  # its ramp begins with 0
-    found = open_loop(replace(loop, series={**loop.series, 'wrench': (ns, tau)}), 'gvc', GAINS)
-    assert np.array_equal(found.ns, ns[5:])
-    assert found.ramps.tolist() == [k < answers for k in range(COUNT - 5)]
-    assert found.notes[0].startswith('5 odometry messages left out')
+    again = np.sort([*range(COUNT), *[5] * silenced])  # but not with one that a watchdog repeats
+    series = {**loop.series, 'wrench': (ns[again], tau[again])}
+    found, first = open_loop(replace(loop, series=series), 'gvc', GAINS), 5 + silenced
+    assert np.array_equal(found.ns, ns[first:])
+    assert found.ramps.tolist() == [k < answers for k in range(COUNT - first)]
+    assert found.notes[0].startswith(f'{first} odometry messages left out')
 
 
 @pytest.mark.parametrize(('more', 'times'), [(0, 1), (1, 2)])
 def test_after_a_silence_that_a_watchdog_hears_a_law_begins_anew(
     tmp_path: Path, more: int, times: int
 ) -> None:
-    loop = recorded_loop(write(tmp_path / 'bag.mcap', params={**REAL_TIME, 'ramp': 0.05}))
+    told = {**REAL_TIME, 'ramp': 0.05, 'odometry_timeout': 0.4}
+    loop = recorded_loop(write(tmp_path / 'bag.mcap', params=told))
     series = {
-        role: (np.where(ns < 20 * STEP, ns, ns + 500_000_000 - STEP + more), x)
+        role: (np.where(ns < 20 * STEP, ns, ns + 400_000_000 - STEP + more), x)
         for role, (ns, x) in loop.series.items()
     }
     found = open_loop(replace(loop, series=series), 'gvc', GAINS)
@@ -192,6 +197,15 @@ def test_a_law_is_in_charge_from_the_answer_before_its_first_estimate(tmp_path: 
     assert np.array_equal(found.ns, ns[9:])
     series['disturbance_estimate'] = ns, 0.0 * f  # a law without one
     assert len(open_loop(replace(loop, series=series), 'gvc', GAINS).ns) == COUNT
+
+
+def test_where_no_wrench_answers_a_recorded_odometry_all_are_asked(tmp_path: Path) -> None:
+    loop = recorded_loop(write(tmp_path / 'bag.mcap', params=REAL_TIME))
+    ns, tau = loop.series['wrench']
+    other = replace(loop, series={**loop.series, 'wrench': (ns + 1, tau)})
+    found = open_loop(other, 'gvc', GAINS)
+    assert (len(found.ns), found.notes) == (COUNT, ())
+    assert reproduction(other, found).holds is None
 
 
 def test_in_lock_step_only_rounding_is_a_reproduction(tmp_path: Path) -> None:
@@ -216,6 +230,7 @@ def test_the_recorded_law_is_asked_again_where_it_is_known(tmp_path: Path) -> No
     once, twice = ('gvc', GAINS), {**GAINS, 'k_D': 3.0}
     assert asked('gvc', {})[0] == [once]
     assert asked('gvc', {'k_D': 3.0})[0] == [('gvc', twice), once]
+    assert asked('cl', {})[0] == [('cl', GAINS), once]
     told, document = asked('cl', {'k_D': 3.0}, {'limits.speed': 0.2})
     assert told == [('cl', twice), once]
     assert (document['recorded']['law'], document['answered']['law']) == ('gvc', 'cl')

@@ -118,6 +118,20 @@ def test_a_bag_that_grows_is_played_up_to_where_it_was(tmp_path: Path) -> None:
     assert [one.ns for one in messages(index, TOPICS, end=index.last)] == list(range(known))
 
 
+def test_a_gap_is_more_than_a_minute_without_any_of_the_topics(tmp_path: Path) -> None:
+    second = 10**9
+    spread = [(ns * second, topic) for ns, topic in [(0, 0), (10, 1), (50, 0), (100, 0), (160, 2)]]
+    write(tmp_path, [spread], chunk_size=1)
+    index = index_bag(tmp_path)
+    assert index.gaps(TOPICS, 0, 2**63) == [], 'a minute is none'
+    assert index.gaps(['/b', '/c'], 0, 2**63) == [(10 * second, 160 * second)]
+
+
+def test_the_first_and_the_last_message_that_are_asked_for_are_played(tmp_path: Path) -> None:
+    write(tmp_path, [[(k, 0) for k in range(4)]], chunk_size=1)
+    assert [one.ns for one in messages(index_bag(tmp_path), TOPICS, 1, 2)] == [1, 2]
+
+
 def test_further_gaps_than_are_told_apart_are_none(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(played_bag, 'MOST_SPANS', 2)
     write(tmp_path, [[(k * 100 * 10**9, 0) for k in range(4)]], chunk_size=1)
@@ -131,6 +145,7 @@ def test_says_how_a_topic_was_recorded(tmp_path: Path) -> None:
     about = {'offered_qos_profiles': text, 'topic_type_hash': known}
     channel = bag._writer.register_channel('/qos', 'cdr', 0, about)
     bag._writer.add_message(channel, 0, b'\0\1\0\0', 0)
+    bag._writer.register_channel('/qos', 'cdr', 0, {'topic_type_hash': known})
     schema = bag._writer.register_schema('std_msgs/msg/Header', 'ros2msg', b'uint8 x')
     channel = bag._writer.register_channel('/a', 'cdr', schema)
     bag._writer.add_message(channel, 0, b'\0\1\0\0', 0)

@@ -109,8 +109,6 @@ def _misfits(pose: Track, *velocities: Track) -> tuple[float, ...]:
     at, t = at_times(pose, ns), (ns - ns[0]) / NANOSECONDS
     moved = [turn(at[:, 3:], at_times(velocity, ns)[:, :3]) for velocity in velocities]
     known = _measured(at[:, :3], *moved)
-    if not known.any():
-        return (0.0,) * (1 + len(velocities))
     pairs = [compare_rates(t, at[:, :3][:, known], velocity[:, known]) for velocity in moved]
     return pairs[0].sizes[0], *(pair.sizes[2] for pair in pairs)
 

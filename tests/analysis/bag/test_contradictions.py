@@ -32,6 +32,7 @@ from auv_analysis.bag.foreign_checks import (
     contradictions,
     delays,
     doubts_of_motion,
+    doubts_of_wrench,
     misread_rates,
 )
 from auv_analysis.bag.foreign_topics import MappedTopic, TopicMap, candidates
@@ -198,6 +199,37 @@ def test_six_seconds_between_the_latest_delays_tell_one(seconds, is_told) -> Non
     assert (found is not None) == is_told
 
 
+@pytest.mark.parametrize(('size', 'is_told'), [(0.6, True), (1.3, False)])
+def test_a_velocity_explains_half_of_the_rate_that_it_is_late_for(size, is_told) -> None:
+    """Beside another motion: 1 / (1 + size^2) of the variance."""
+    t = np.arange(0.0, 600.0, 0.05)
+    path = -np.cos(0.8 * t) / 0.8 - size * np.cos(2.1 * t + 1.0) / 2.1
+    found = behind(t, path[:, None], np.sin(0.8 * (t - 0.2))[:, None])
+    assert (found is not None) == is_told
+    assert found is None or found.value == pytest.approx(0.2, abs=3.0 * found.error)
+
+
+@pytest.mark.parametrize(('size', 'is_told'), [(0.2, True), (0.4, False)])
+def test_a_wrench_explains_nine_tenths_of_what_it_is_late_for(size, is_told) -> None:
+    """Of the variance of the acceleration, 1 / (1 + size^2)."""
+    t, still = np.arange(0.0, 60.0, 0.02), np.zeros((3000, 5))
+
+    def force(t: np.ndarray) -> np.ndarray:
+        return np.sin(1.1 * t) + np.sin(1.9 * t + 1.0)
+
+    other = size * (np.sin(1.4 * t) + np.sin(2.3 * t + 2.0))
+    nu = cumulative_trapezoid(force(t - 0.2) + other, t, initial=0.0)
+    pose = np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (3000, 1))
+    twist, wrench = (np.column_stack([x, still]) for x in (nu, force(t)))
+    named = ('pose', pose), ('twist', twist), ('wrench', wrench)
+    tracks = [
+        Track(role, f'/{role}', nanoseconds(t), rows, np.inf, held=False) for role, rows in named
+    ]
+    found = acts_behind(*tracks)
+    assert (found is not None) == is_told
+    assert found is None or found.value == pytest.approx(0.2, abs=0.02)
+
+
 def test_a_delay_is_the_lowest_point_and_its_error_the_scatter_of_the_parts() -> None:
     lowest = np.where(np.arange(20) < 10, 0.24, 0.44)  # s
     found, least = _least(-1.0, lambda delay: 3.0 * (delay - lowest) ** 2, 6)
@@ -216,6 +248,18 @@ def test_a_delay_is_told_where_it_is_no_chance_and_sharp(value, error, is_told) 
     assert _clear(Delay(value, error)) == (Delay(value, error) if is_told else None)
 
 
+def test_the_error_of_a_late_wrench_holds_what_another_filter_changes(run, monkeypatch) -> None:
+    seen, ns = motion(run, enu=False), nanoseconds(run.t)
+    pose = np.column_stack([seen.position, np.roll(seen.attitude, 1, axis=1)])
+    named = ('pose', pose), ('twist', run.nu), ('wrench', run.tau)
+    tracks = [Track(role, '', ns, rows, np.inf, held=False) for role, rows in named]
+    said = iter((Delay(0.2, 0.003), Delay(0.204, 0.1)))
+    monkeypatch.setattr(foreign_checks, '_acts_behind', lambda *_: next(said))
+    found = acts_behind(*tracks)
+    assert found is not None
+    assert (found.value, found.error) == pytest.approx((0.2, 0.005))
+
+
 def test_the_wrench_that_was_applied_is_the_one_that_is_late(monkeypatch) -> None:
     pose, twist = along_east(0.5, 0.5)
     monkeypatch.setattr(foreign_checks, 'acts_behind', lambda *_: Delay(0.2, 0.01))
@@ -228,7 +272,7 @@ def test_the_wrench_that_was_applied_is_the_one_that_is_late(monkeypatch) -> Non
 def test_signals_are_compared_in_the_longest_time_without_a_gap() -> None:
     one, other = (
         Track('twist', '/t', np.array(ns), np.zeros((len(ns), 1)), 3.0, held=False)
-        for ns in ([0, 1, 2, 9, 10, 11, 12, 13, 14, 15], [8, 10, 13, 14, 22])
+        for ns in ([*range(-10, 3), *range(9, 21)], [1, 2, *range(9, 15), 18, 20, 23])
     )
     assert _together(one, other).tolist() == [9, 10, 11, 12, 13, 14]
 
@@ -373,6 +417,15 @@ def test_a_wrench_of_zeros_is_named(run, tmp_path) -> None:
     assert note.startswith('/w: every wrench is zero')
     one = replace(run, tau=run.tau * [0, 0, 1, 0, 0, 0])
     assert not said(loaded(bag_of(run, tmp_path / 'one', tau=one), **KEYS), 'is zero')
+
+
+def test_each_wrench_of_zeros_is_named_by_its_role() -> None:
+    _, twist = along_east(0.5, 0.5)
+    zero = replace(twist, rows=0.0 * twist.rows)
+    for role, words in (('wrench', 'wrench'), ('wrench_applied', 'wrench applied')):
+        (note,) = doubts_of_wrench({'twist': zero, role: replace(zero, topic='/f')})
+        assert note.startswith(f'/f: every {words} is zero')
+        assert doubts_of_wrench({'twist': zero, role: twist}) == []
 
 
 def test_stamps_in_bursts_are_told_and_spread(run, tmp_path) -> None:

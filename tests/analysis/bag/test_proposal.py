@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,13 +20,14 @@ from helpers.foreign_bags import (
     write,
 )
 from helpers.foreign_logs import HEADS, SENSORS, columns, every, maker, text_of
-from helpers.made_messages import Bag, new, serialized
+from helpers.made_messages import STRING, Bag, new, serialized
 from numpy.testing import assert_allclose
 from rosbags.typesys import get_types_from_msg
 
 from auv_analysis.bag import proposal as proposing
-from auv_analysis.bag.any_bag import survey
+from auv_analysis.bag.any_bag import messages, survey
 from auv_analysis.bag.csv_logs import Span
+from auv_analysis.bag.foreign_fields import presets
 from auv_analysis.bag.foreign_topics import (
     candidates,
     other_odometries,
@@ -121,6 +123,17 @@ def test_what_begins_late_is_seen(kind, run, tmp_path) -> None:
     assert found.spans['depth'].high == 30.0
     assert found.stamp == ('t', 's')
     assert 330 < found.spans['ranges[0]'].filled < 335
+
+
+def test_a_share_of_the_messages_of_some_topics_is_taken_evenly(tmp_path) -> None:
+    bag = Bag(tmp_path / 'dive.mcap')
+    for k in range(8):
+        for topic in ('/a', '/b', '/c'):
+            bag.add(topic, STRING, k, serialized(new(STRING, 'x')))
+    found = [(one.topic, one.log_time) for one in
+             messages(bag.close(), ['/a', '/b'], [], {'/a': 0.375})]  # fmt: skip
+    assert [ns for topic, ns in found if topic == '/a'] == [0, 2, 5]
+    assert [ns for topic, ns in found if topic == '/b'] == [*range(8)]
 
 
 def test_constants_of_a_definition_are_no_fields(tmp_path) -> None:
@@ -388,6 +401,38 @@ def test_of_many_topics_fewer_messages_are_looked_at(topics, share, monkeypatch)
     found = looked_through(Path('bag'), BagContents(types=kinds, counts=counts))
     assert asked == dict.fromkeys(kinds, share) | {'/0': 1.0}
     assert {topic: one.share for topic, one in found.items()} == asked
+
+
+@pytest.mark.parametrize('dead', ['qw qx qy qz', 'u v w', 'p q r', ''])
+def test_an_odometry_has_attitude_velocity_and_angular_velocity(dead) -> None:
+    kind = 'nav_msgs/msg/Odometry'
+    spans = {
+        path: Span(3, 0.0, 0.0 if name in dead.split() else 1.0)
+        for name, path in presets('odometry')[kind].items()
+    }
+    contents = BagContents(types={'/o': kind}, counts={'/o': 3})
+    text = proposal(Path('x'), contents, {'/o': Looked(kind, spans=spans, count=3)})
+    assert ('# /o: no attitude or no velocity in it but zeros' in text) == bool(dead)
+    assert ('odometry' in yaml.safe_load(text)) == (not dead)
+
+
+def test_a_column_without_a_number_is_no_component() -> None:
+    spans = {'force_x': Span(0, np.inf, -np.inf), 'force_y': Span(3, 0.0, 1.0)}
+    contents = BagContents(types={'a': 'csv'}, counts={'a': 3})
+    found = yaml.safe_load(proposal(Path('x'), contents, {'a': Looked('csv', spans=spans)}))
+    assert found['wrench']['fields'] == {'Y': 'force_y'}
+
+
+def test_frame_ids_are_those_of_the_first_message_and_spans_of_all() -> None:
+    looked, bare = Looked('x'), Looked('x')
+    for frame, x in (('a', 2.0), ('b', -1.0), ('c', np.nan)):
+        header = SimpleNamespace(frame_id=frame)
+        looked.take(SimpleNamespace(header=header, child_frame_id='', x=x))
+        bare.take(SimpleNamespace(child_frame_id=frame, x=x))
+    assert (looked.ids, looked.stamped, looked.count) == (('a',), True, 3)
+    assert (bare.ids, bare.stamped) == (('a',), False)
+    assert looked.spans == {'x': Span(2, -1.0, 2.0)}
+    assert looked.table == {'x': {'values': 2, 'least': -1.0, 'largest': 2.0}}
 
 
 @pytest.mark.parametrize(('columns', 'units'), [

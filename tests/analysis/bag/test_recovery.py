@@ -339,10 +339,11 @@ def test_without_chunks_a_damaged_message_costs_itself_alone(
 
 
 def test_a_message_is_not_believed_where_no_record_follows() -> None:
-    """Its length leads into the next one, to a zero."""
-    sent = [bytearray(bytes_of(said(k, b'abc'))) for k in (1, 2, 3)]
-    assert sent[2][2] == 0
-    struct.pack_into('<Q', sent[1], 1, len(sent[1]) - 9 + 2)
+    """Its length leads into the data of the next one, to zeros."""
+    sent = [
+        bytearray(bytes_of(said(k, data))) for k, data in ((1, b'abc'), (2, b''), (3, bytes(20)))
+    ]
+    struct.pack_into('<Q', sent[1], 1, len(sent[1]) - 9 + len(sent[2]) - 18)
     data = file_of(DEFINED, *sent)
     rows, _, document = recovered(data)
     assert rows == [('/a', 1, b'abc')]

@@ -86,6 +86,8 @@ def test_parts_that_stand_in_another_order_are_one_recording() -> None:
     assert not notes
     paused = recorded(np.array([12, 13, 14, *parts]) * SECOND)
     assert len(longest_stretch(paused, notes).stamps) < 12, 'two seconds later: another run'
+    overlapping = recorded(np.array([10, 12, 14, 16, 4, 6, 8, 11]) * SECOND // 2)
+    assert len(longest_stretch(overlapping, notes).stamps) == 4, 'of the same time: another run'
 
 
 def test_a_single_message_of_another_time_is_left_out_and_counted() -> None:
@@ -128,6 +130,9 @@ def test_logged_times_are_put_on_another_clock() -> None:
     ahead = recorded(900 * SECOND + clock.stamps, log=clock.log).part(np.array([2, 0, 1, 4, 3]))
     found = on_the_clock(logged, ahead, notes)  # whatever order it was logged in
     assert_allclose(found.stamps / SECOND, [899.0, 900.5, 902.0, 906.0])
+    late = recorded(np.array([0, 10, 5, 30, 40]) * SECOND // 10, log=(100 + np.arange(5)) * SECOND)
+    again = recorded(np.array([102, 103]) * SECOND, stamped=False)
+    assert_allclose(on_the_clock(again, late, notes).stamps / SECOND, [1.0, 3.0])
     near = recorded(np.arange(5) * SECOND, log=np.arange(5) * SECOND + SECOND // 10)
     assert on_the_clock(logged, near, []) is logged, 'one clock and a delay'
 
@@ -151,18 +156,19 @@ def test_no_line_leads_from_a_single_message() -> None:
 
 
 def test_the_rate_of_an_attitude_is_none_in_its_gaps() -> None:
-    t = np.r_[np.arange(0, 21), np.arange(40, 66)] * SECOND // 10
+    t = np.r_[np.arange(0, 21), np.arange(40, 49)] * SECOND // 10  # nine, for a cubic
     psi = 0.5 * t / SECOND
     rows = np.column_stack([np.zeros((len(t), 3)), np.cos(psi / 2), np.zeros((len(t), 2)),
                             np.sin(psi / 2)])  # fmt: skip
     pose = Track('pose', '/p', t, rows, 0.5 * SECOND, held=False)
-    ns = np.arange(-3, 70) * SECOND // 10
-    twist = Track('twist', '/v', ns, np.arange(73.0)[:, None] * np.ones(6), np.inf, held=False)
+    ns = np.arange(-3, 60) * SECOND // 10
+    moved = np.arange(63.0)[:, None] + 100.0 * np.arange(6)
+    twist = Track('twist', '/v', ns, moved, np.inf, held=False)
     notes: list[str] = []
     found = with_rates(twist, pose, notes)
-    kept = np.r_[np.arange(3, 24), np.arange(43, 69)]
+    kept = np.r_[np.arange(3, 24), np.arange(43, 52)]
     assert_array_equal(found.ns, ns[kept])
-    assert_array_equal(found.rows[:, 0], kept)
+    assert_array_equal(found.rows[:, :3], moved[kept, :3])
     assert_allclose(found.rows[:, 3:], [[0, 0, 0.5]] * len(kept), atol=1e-9)
     assert notes[0].startswith('/p: the angular velocity is the rate of its attitude')
 

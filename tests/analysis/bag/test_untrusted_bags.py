@@ -314,13 +314,13 @@ def test_attachments_that_are_too_long_or_too_many(
     data = MAGIC + b''.join(map(record, [Header('ros2', 'harm'), *items, *rest]))
     ending = record(DataEnd(zlib.crc32(data))) + record(Footer(0, 0, 0)) + MAGIC
     path.write_bytes(data + ending)
-    sizes = [*sizes[1:3], ('more', 9000), ('last', 1001)]
+    sizes = [('second', 30_000), ('more', 9000), ('last', 1001)]
     more = [Attachment(0, 0, name, '', b'x' * size) for name, size in sizes]
     data = MAGIC + b''.join(map(record, [Header('ros2', 'harm'), *more]))
     path.with_name('bag_1.mcap').write_bytes(data + record(DataEnd(0)) + record(Footer(0, 0, 0)))
     contents = read_bag(path.parent)
     assert {name: len(text) for name, text in contents.attachments.items()} == {
-        'first': 60_000, 'second': 30_000, 'more': 9000
+        'first': 61_000, 'second': 30_000, 'more': 9000
     }  # fmt: skip
     assert contents.counts == {'/a': 1}
     long, third, last = contents.notes

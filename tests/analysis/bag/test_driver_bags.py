@@ -267,7 +267,24 @@ def test_messages_that_nobody_could_use_are_left_out_and_counted(tmp_path: Path)
     notes = ' '.join(run.notes)
     assert 'bag.mcap: /odom: 3 unusable messages left out, the first one: ' in notes
     assert 'bag.mcap: /wrench: 2 unusable messages left out, the first one: ' in notes
+    assert 'elsewhere' not in notes, 'the third one'
     assert_array_equal(joined([*open_bag(bag, whole=16).run.blocks(7)]).tau, run.tau)
+
+
+@pytest.mark.parametrize('channels', [('/odom', '/ground_truth/odom'), ('/ground_truth/odom',)])
+def test_the_first_odometry_says_which_frames_hold(tmp_path: Path, channels: tuple) -> None:
+    """In whatever order the topics were registered."""
+    bag = Bag(tmp_path / 'bag.mcap')
+    bag.attach(RECORDING, recording_text(False, {}))
+    for topic in channels:
+        bag.channel(topic, ODOMETRY)
+    for k in range(3):
+        for topic, frames in (('/odom', FRAMES), ('/ground_truth/odom', ('other', FRAMES[1]))):
+            data = serialized(odometry(k * MS, state(k), frames))
+            bag.add(topic, ODOMETRY, k * MS, data)
+    contents = read_bag(bag.close())
+    assert contents.frames['/'].odom == FRAMES[0]
+    assert {topic: len(ns) for topic, (ns, _) in contents.messages.items()} == {'/odom': 3}
 
 
 def test_in_lock_step_they_are_refused(tmp_path: Path) -> None:

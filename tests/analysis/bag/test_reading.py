@@ -177,12 +177,26 @@ def test_bags_with_damaged_bytes(write: Any, flips: list[tuple[float, int]]) -> 
 @pytest.mark.parametrize('role', ['odom', 'wrench'])
 @pytest.mark.parametrize('place', [0, 5])
 def test_one_odd_message_amid_usable_ones(odd: str, role: str, place: int, tmp_path: Path) -> None:
-    bag = Bag(tmp_path / 'bag.mcap', chunk_size=4000)
+    bag = Bag(tmp_path / 'bag.mcap', chunk_size=4000 if place else 100_000)
+    for name in ('wrench', 'odom', 'cmd_vel') if place == 0 else ():  # all in one table
+        bag.channel(f'/{name}', message(name, 0)[0])
     for k in range(10):
         for name in ('wrench', 'odom', 'cmd_vel'):
             kind, data = message(name, k, odd if (name, k) == (role, place) else '')
             bag.add(f'/{name}', kind, k * STEP, data)
     assert_equal_reading(bag.close())
+
+
+def test_a_topic_in_another_frame_is_free_up_to_the_first_odometry_alone(tmp_path: Path) -> None:
+    bag, (kind, odom) = Bag(tmp_path / 'bag.mcap'), message('odom', 1)
+    for role in ('odom', 'wrench'):
+        bag.channel(f'/{role}', message(role, 0)[0])
+    for k in (0, 1, 2):
+        wrench, data = message('wrench', k, 'other frame')
+        bag.add('/wrench', wrench, k * STEP, data)
+        if k == 1:
+            bag.add('/odom', kind, k * STEP, odom)
+    assert '/wrench: expected usable messages' in str(assert_equal_reading(bag.close()))
 
 
 @pytest.mark.parametrize('index', [True, False])
@@ -192,9 +206,9 @@ def test_channels_of_constant_length_never_meet_the_decoder(
 ) -> None:
     bag = Bag(tmp_path / 'bag.mcap', index=index, compression=COMPRESSIONS[compression])
     for k in range(300):
-        for role in ('cmd_vel', 'odom', 'wrench'):
-            kind, data = message(role, k)
-            bag.add(f'/{role}', kind, k * STEP, data)
+        for topic in ('/cmd_vel', '/odom', '/wrench', '/alone/wrench'):
+            kind, data = message(topic.rpartition('/')[2], k)
+            bag.add(topic, kind, k * STEP, data)
     path, decoded = bag.close(), []
     original = step_topics.DecoderFactory.decoder_for
 
@@ -204,8 +218,9 @@ def test_channels_of_constant_length_never_meet_the_decoder(
 
     monkeypatch.setattr(step_topics.DecoderFactory, 'decoder_for', counting)
     contents = read_bag(path)
-    assert contents.counts == dict.fromkeys(('/cmd_vel', '/odom', '/wrench'), 300)
-    assert len(decoded) <= 4, 'one proof per channel, and the frames of the first odometry'
+    topics = '/cmd_vel', '/odom', '/wrench', '/alone/wrench'
+    assert contents.counts == dict.fromkeys(topics, 300)
+    assert len(decoded) <= 5, 'one proof per channel, and the frames of the first odometry'
 
 
 def test_a_schema_with_its_fields_in_another_order_is_obeyed(tmp_path: Path) -> None:

@@ -188,6 +188,7 @@ def test_limits_know_bursts() -> None:
     assert usual_limit(bursts) > 0.08 * NANOSECONDS, 'a pause between bursts is none'
     pauses = np.cumsum([0.1] * 40 + [30.0] + [0.1] * 40) * NANOSECONDS
     assert usual_limit(pauses.astype(np.int64)) < 1.0 * NANOSECONDS
+    assert usual_limit(even[:2]) == pytest.approx(0.5 * NANOSECONDS)
     assert usual_limit(even[:1]) == np.inf
 
 

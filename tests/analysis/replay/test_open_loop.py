@@ -14,6 +14,7 @@ from helpers.shown import document_lines
 from auv_analysis.bag.step_topics import ACCEL, ODOMETRY, TWIST, WRENCH
 from auv_analysis.cli import main
 from auv_analysis.replay import compared as comparing
+from auv_analysis.replay import open_loop as opening
 from auv_analysis.replay.compared import ask_law, compared, metrics_of, reproduction
 from auv_analysis.replay.open_loop import OpenLoop, open_loop, recorded_loop, recorded_settings
 from auv_dynamics import load_vehicle
@@ -354,6 +355,15 @@ def test_wrenches_are_compared_where_there_are_both(tmp_path: Path) -> None:
 def test_refuses_other_laws_and_gains(tmp_path: Path, law: str, gains: dict, words: str) -> None:
     with pytest.raises(InputError, match=words):
         open_loop(recorded_loop(write(tmp_path / 'bag.mcap')), law, gains)
+
+
+def test_a_law_is_tried_at_rest_before_it_is_asked(tmp_path: Path, monkeypatch) -> None:
+    def fails(*_: object) -> None:
+        raise ValueError('expected wrench of Mine to answer at rest, found nothing')
+
+    monkeypatch.setattr(opening, 'try_law', fails)
+    with pytest.raises(InputError, match='--law: expected wrench of Mine to answer at rest'):
+        open_loop(recorded_loop(write(tmp_path / 'bag.mcap')), 'gvc', GAINS)
 
 
 @pytest.mark.parametrize(

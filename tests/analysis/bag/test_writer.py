@@ -36,9 +36,15 @@ PATIENCE = patience(20.0)  # s
 def test_metadata_say_when_a_bag_begins_and_how_long_it_is(tmp_path: Path) -> None:
     told = yaml.safe_load((write_bag(tmp_path / 'bag', first=1000) / 'metadata.yaml').read_text())
     whole = told['rosbag2_bagfile_information']
+    assert (whole['version'], whole['storage_identifier']) == (9, 'mcap')
     for one in (whole, *whole['files']):
         assert one['starting_time'] == {'nanoseconds_since_epoch': 1000 * STEP}
         assert one['duration'] == {'nanoseconds': 29 * STEP}
+    bag = write_bag(tmp_path / 'split', first=1000, max_duration=20 * STEP)
+    told = yaml.safe_load((bag / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+    for one, first, count in zip((told, *told['files']), (0, 0, 20), (30, 20, 10), strict=True):
+        assert one['starting_time'] == {'nanoseconds_since_epoch': (1000 + first) * STEP}
+        assert one['duration'] == {'nanoseconds': (count - 1) * STEP}
     assert [key for key in whole if not whole[key]] == [
         'compression_format', 'compression_mode', 'custom_data',
     ]  # fmt: skip

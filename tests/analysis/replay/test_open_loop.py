@@ -89,7 +89,9 @@ def by_hand(law: str, slope: np.ndarray, keep: list[int]) -> np.ndarray:
 @pytest.mark.parametrize('late', [0, 5])
 def test_it_is_the_sampled_law(tmp_path: Path, law: str, late: int) -> None:
     loop = recorded_loop(write(tmp_path / 'bag.mcap', late=late))
-    found = open_loop(loop, law, GAINS)
+    done: list[int] = []
+    found = open_loop(loop, law, GAINS, done.append)
+    assert done[-1] == loop.samples == COUNT
     assert np.array_equal(found.tau, by_hand(law, rows(COUNT, 6), list(range(COUNT))))
     assert found.ns.tolist() == [k * STEP for k in range(COUNT)]
     assert not found.trouble

@@ -246,6 +246,21 @@ def test_a_file_is_full_where_the_next_message_would_not_fit(tmp_path: Path) -> 
     assert (tmp_path / 'x.mcap').stat().st_size <= 50_000
 
 
+@pytest.mark.parametrize(('topics', 'chunk_size'), [(1, 1 << 20), (1, 1), (50, 1 << 20)])
+def test_many_small_messages_chunks_or_topics_do_not_make_a_file_too_large(
+    tmp_path: Path, topics: int, chunk_size: int
+) -> None:
+    file = BagFile(tmp_path / 'x.mcap', {}, Storage('none', chunk_size, max_size=200_000))
+    for i in range(topics):
+        file.define(Definition(f'/topic{i}', STRING, qos=QOS), 'string data')
+    k = 0
+    while not file.is_full(topic := f'/topic{k % topics}', k, 4):
+        file.write(topic, k, b'abcd')
+        k += 1
+    file.finish()
+    assert 100_000 < (tmp_path / 'x.mcap').stat().st_size <= 200_000
+
+
 def test_attachments_say_what_they_are(tmp_path: Path) -> None:
     writer = BagWriter(tmp_path / 'bag', dict.fromkeys(('a.yaml', 'b.yml', 'c.txt'), 'x'))
     writer.close()

@@ -43,7 +43,7 @@ def definition(name: str) -> str:
 def _references(package: str, text: str) -> list[str]:
     found = []
     for line in text.splitlines():
-        match = FIELD.match(line.split('#')[0])
+        match = FIELD.match(line)
         if match and match[1] not in PRIMITIVES:
             # `Header` and `Time` of a message's own package are written without it
             found.append(match[1] if '/' in match[1] else f'{package}/{match[1]}')

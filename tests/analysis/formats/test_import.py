@@ -57,6 +57,7 @@ def test_bluerov2_of_a_list_is_the_shipped_one(imported):
     assert document['format'] == 'mss'
     assert document['vehicle']['source'] == 'imported from a list of derivatives, list.m'
     assert_same(vehicle, load_vehicle('bluerov2'), DIGITS)
+    assert document['vehicle']['environment'] == {'water_density': 1000, 'gravity': 9.81}
     assert any('Xuu' in text for text in document['assumed'])
 
 
@@ -78,14 +79,65 @@ def test_link_of_gazebo_is_turned_to_forward_starboard_down(imported):
 
 
 def test_a_tensor_in_axes_of_its_own_is_turned_into_those_of_the_link(imported):
-    text = sdf().replace('-0.03 0 0 0</pose>', '-0.03 0 0 1.5707963267948966</pose>')
-    fin = '<link name="fin"><inertial><mass>2.5</mass></inertial></link>'
+    pose = '0.01 0.02 -0.03 0 0'
+    text = sdf().replace(f'<pose>{pose} 0', f'<pose degrees="true">{pose} 90')
+    fin = '<link name="fin"><inertial><mass>2.5</mass></inertial></link><link name="light"/>'
     text = text.replace('0 0 -9.81', '0 0 -3.71').replace('</model>', f'{fin}</model>')
     vehicle, document = imported('a.sdf', text)
     inertia = document['vehicle']['rigid_body']['inertia']
     assert_allclose(inertia, [[0.5, 0.01, 0.03], [0.01, 0.4, 0.02], [0.03, 0.02, 0.6]], atol=1e-12)
     assert vehicle.weight == pytest.approx(37.1)
-    assert any('1 other links of the model' in t and '2.5 kg' in t for t in document['assumed'])
+    assert any('2 other links of the model' in t and '2.5 kg' in t for t in document['assumed'])
+
+
+@pytest.mark.parametrize(
+    ('file', 'text', 'options', 'name'),
+    [
+        ('a.sdf', sdf(), (), 'made'),
+        ('a.sdf', sdf().replace(' name="made"', ''), (), 'a'),
+        ('a.urdf', URDF, (), 'rexrov'),
+        ('a.yaml', REXROV, (), 'a'),
+        ('a.yaml', f'{REXROV}model: other\n', (), 'other'),
+        ('a.m', BLUEROV2, LIST, 'a'),
+    ],
+)
+def test_a_vehicle_has_the_name_that_it_had(tmp_path, capsys, file, text, options, name):
+    (tmp_path / file).write_text(text, encoding='utf-8')
+    main(['import-vehicle', str(tmp_path / file), *options, '--json'])
+    assert json.loads(capsys.readouterr().out)['vehicle']['name'] == name
+
+
+def test_what_a_model_of_gazebo_leaves_open(imported):
+    named = 'filename="gz-sim-hydrodynamics-system" name="gz::sim::systems::Hydrodynamics"'
+    by_tags = sdf().replace(named, 'name="mine"')
+    spaced = sdf().replace('base_link<', ' base_link\n<')
+    for text in (by_tags, spaced, spaced.replace(' base_link\n', 'made::base_link')):
+        assert text != sdf()
+        assert_same(imported('made.sdf', text)[0], imported('other.sdf', sdf())[0])
+    fluid = '<fluid_added_mass><xx>5</xx></fluid_added_mass>'
+    by_name = re.sub('(?s)base_link</link_name>.*</plugin></model>',
+                     'base_link</link_name></plugin></model>', sdf(fluid=fluid))  # fmt: skip
+    vehicle, document = imported('a.sdf', by_name.replace(named, named.partition(' ')[2]))
+    assert_array_equal(vehicle.M_A, np.diag([5, 0, 0, 0, 0, 0]))
+    assert 'damping.linear: zero, as there is none in the file' in document['assumed']
+    plain = re.sub('<i(xy|xz|yz)>[^/]*</i..>', '', sdf())
+    vehicle, document = imported('a.sdf', plain[plain.index('<world') : -len('</sdf>')])
+    assert document['vehicle']['rigid_body']['inertia'] == np.diag([0.4, 0.5, 0.6]).tolist()
+    assert not any('ixy' in text for text in document['traps'])
+    mars = plain.replace('0 0 -9.81', '0 0 -3.71')
+    assert imported('a.sdf', mars[mars.index('<world') : -len('</sdf>')])[0].weight == 37.1
+    alone = re.sub('<gravity>.*</gravity>', '', mars)
+    vehicle, document = imported('a.sdf', alone)
+    assert vehicle.weight == 98.0
+    assert any('gravity: 9.8 m/s2' in text for text in document['assumed'])
+    for value in ('1', 'true', '0'):
+        off = f'<disable_added_mass>{value}</disable_added_mass>'
+        _, document = imported('a.sdf', sdf(more=off))
+        said = any('disable_added_mass' in text for text in document['traps'])
+        assert said == (value != '0')
+    twice = '<xUU>-2</xUU><yUV>-1</yUV><yVabsU>-3</yVabsU><zVW>0</zVW><yUabsV>0</yUabsV>'
+    vehicle, _ = imported('a.sdf', sdf(more=twice), '--quadratic-abs')
+    assert (vehicle.D_quadratic[0, 0], vehicle.lift[1, 1]) == (20.0, 4.0)
 
 
 @pytest.mark.parametrize(('shape', 'volume'), [
@@ -170,6 +222,15 @@ def test_what_uuv_simulator_does_by_itself(imported):
     usual, document = imported('a.yaml', REXROV.replace('density: 1028.0', ''))
     assert usual.buoyancy == pytest.approx(load_vehicle('rexrov').buoyancy)
     assert any('1028 kg/m3, its default' in text for text in document['assumed'])
+    more = 'gravity: 3.71\nscaling_volume: 1\noffset_volume: 0\nlength: 2.6\n'
+    floating, document = imported('a.yaml', f'{REXROV}neutrally_buoyant: 1\n{more}')
+    assert floating.buoyancy == floating.weight == pytest.approx(1862.87 * 3.71)
+    assert not any('gravity:' in text for text in document['assumed'])
+    assert document['left_out'] == []
+    added = np.diag([7.0, 6.0, 5.0, 4.0, 3.0, 2.0])
+    for given in (added.diagonal().tolist(), added.tolist()):
+        vehicle, _ = imported('a.yaml', re.sub('added_mass: .*', f'added_mass: {given}', REXROV))
+        assert_array_equal(vehicle.M_A, added)
     quadratic = -np.diag([5.0, 4.0, 3.0, 2.0, 1.0, 9.0])
     quadratic[0, 1] = 7.0
     told = ' '.join(map(str, quadratic.ravel()))
@@ -244,7 +305,7 @@ def forces(vehicle, u):
 
 FRAMES = """<frame name="aft" attached_to="mount"><pose>-1 0 0 0 0 0</pose></frame>
   <link name="fin"><pose relative_to="aft">0 0.5 0 0 0 0</pose></link>
-  <joint name="hinge" type="fixed"><pose degrees="true">0 0 1 0 0 90</pose><child>fin</child>
+  <joint name="hinge" type="fixed"><pose degrees="1">0 0 1 0 0 90</pose><child>fin</child>
     <parent>base_link</parent></joint>
   <frame name="mount"><pose relative_to="base_link">0 0 0 0 0 0</pose></frame>"""
 
@@ -324,6 +385,22 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
     'u times another abs': ('a.sdf', sdf(more='<yUabsV>-3</yUabsV>'), [], '--leave-out'),
     'which lift': ('a.m', REMUS + REMUS_LIFT, LIST, '--lift alone'),
     'damping that feeds': ('a.sdf', sdf().replace('-18', '18'), [], '--sign positive'),
+    'two plugins': ('a.sdf', sdf(more='</plugin><plugin><xU>-1</xU>'), [], '2 of them'),
+    'no such link': ('a.sdf', sdf().replace('base_link<', 'base<'), [], 'a link of this file'),
+    'no mass of a link': ('a.sdf', sdf().replace('<mass>10</mass>', ''), [], 'link.inertial.mass'),
+    'an acceleration times a speed': ('a.sdf', sdf(more='<xDotUU>-3</xDotUU>'), [], '--leave-out'),
+    'half a product': ('a.sdf', sdf(more='<xUabs>-3</xUabs>'), [], '--leave-out'),
+    'no entry of added mass': (
+        'a.sdf', sdf(added='', fluid='<fluid_added_mass><xw>1</xw></fluid_added_mass>'), [],
+        'fluid_added_mass.xw: expected xx, xy'),
+    'no centre of buoyancy': (
+        'a.yaml', REXROV.replace('cob: [0, 0, 0.3]', ''), [], '--center-of-buoyancy'),
+    'two hydrodynamic links': ('a.urdf', URDF.replace('</plugin>',
+        '<link name="b"><hydrodynamic_model/></link></plugin>'), [], 'found 2 of them'),
+    'no inertial': ('a.urdf', re.sub('(?s)<inertial>.*</inertial>', '', URDF), [],
+        '<inertial> of the link rexrov/base_link'),
+    'another weight': ('a.m', BLUEROV2.replace('W = 112.8', 'W = 114'), LIST,
+        'expected m g = 112.815 N, found 114'),
     'added mass twice': (
         'a.sdf', sdf(fluid='<fluid_added_mass><xx>1</xx></fluid_added_mass>'), [], 'it twice'),
     'a word for a number': ('a.sdf', sdf().replace('-18', 'much'), [], 'xUabsU: expected'),

@@ -2,6 +2,7 @@
 
 import json
 import re
+from contextlib import nullcontext
 from importlib.util import find_spec
 
 import numpy as np
@@ -51,6 +52,13 @@ def refused(tmp_path, monkeypatch, capsys):
         return line
 
     return run
+
+
+@pytest.fixture
+def dry(monkeypatch):
+    """Hulls without added mass, which takes the time."""
+    nothing = np.zeros((6, 6))
+    monkeypatch.setattr(mesh_import, 'converged', lambda *_: (nothing, nothing, 0))
 
 
 @pytest.fixture
@@ -217,6 +225,29 @@ def test_what_the_user_gives_is_taken_and_the_vehicle_by_other_commands(
     assert (tmp_path / 'runs' / 'summary.json').is_file()
 
 
+@pytest.mark.usefixtures('dry')
+def test_the_inertia_is_as_it_was_given_or_else_that_of_the_hull(imported):
+    given = '--inertia', '110', '300', '400', '1', '5', '2', '--products', 'tensor'
+    options = *given, '--inertia-reference', 'co', '--gravity', '3.71', '--cog', '0', '0', '0.1'
+    vehicle, document = imported(wedge(), *options, mass=200.0)
+    body = document['vehicle']['rigid_body']
+    assert body['inertia'] == [[110, 1, 5], [1, 300, 2], [5, 2, 400]]
+    assert body['inertia_reference'] == 'co'
+    assert vehicle.weight == pytest.approx(742.0)
+    assert not any('gravity:' in text for text in document['assumed'])
+    _, document = imported(wedge(), *given[:4], mass=200.0)
+    assert document['vehicle']['rigid_body']['inertia'] == np.diag([110, 300, 400]).tolist()
+    vehicle, document = imported(wedge(), mass=200.0)
+    corners = np.array(wedge().vertices)
+    centre = corners.mean(axis=0)
+    about = 200.0 / 20 * (corners - centre).T @ (corners - centre)  # of x y dm in a tetrahedron
+    exact = np.trace(about) * np.eye(3) - about
+    assert_allclose(document['vehicle']['rigid_body']['inertia'], exact, rtol=1e-6)
+    assert_allclose(vehicle.r_B, centre, rtol=1e-6)
+    assert_array_equal(vehicle.r_G, vehicle.r_B)
+    assert 'environment.gravity: 9.81 m/s2' in document['assumed']
+
+
 @pytest.mark.parametrize(('units', 'length'), [('mm', 0.001), ('cm', 0.01), ('in', 0.0254)])
 def test_units_of_a_mesh(imported, rough, units, length):
     hull = trimesh.creation.box(np.array([2.0, 1.0, 0.5]) / length)
@@ -237,10 +268,27 @@ def test_what_a_mesh_does_not_say_is_asked_for(refused):
     assert '1e+09 times the mass' in wrong
     assert 'flu if it is longest ahead, along x' in refused(hull, *SAID, '--units', 'mm')
     assert 'found fru' in refused(hull, *SAID, '--units', 'mm', '--axes', 'fru')
-    assert '--mass' in refused(hull, *SAID, '--volume', '1')
+    said = refused(hull, *SAID, '--volume', '1')
+    assert 'hydrostatics.volume: expected that of the mesh' in said
+    said = refused(hull, *SAID, '--center-of-buoyancy', '0', '0', '1')
+    assert 'hydrostatics.center_of_buoyancy: expected that of the mesh' in said
+    assert 'none of mm, cm, m, in fits the mass' in refused(hull, '--mass', '90', *SAID[2:])
+    for axes in ('fl', 'flux', 'ffu'):
+        assert f'found {axes}' in refused(hull, *SAID, '--units', 'mm', '--axes', axes)
+    there = *SAID, '--units', 'mm', '--axes', 'flu', '--inertia', '110', '300', '400', '1'
+    assert 'expected 3 or 6 numbers' in refused(hull, *there)
+    assert '--products integral' in refused(hull, *there, '5', '2')
 
 
-def test_open_surfaces_and_other_files_are_refused(refused, tmp_path, capsys):
+@pytest.mark.parametrize(('mass', 'fits'), [(499, False), (501, True), (1999, True), (2001, False)])
+@pytest.mark.usefixtures('dry')
+def test_a_hull_that_displaces_half_or_twice_its_mass_is_of_other_units(imported, mass, fits):
+    hull = trimesh.creation.box((2, 1, 0.5))
+    with nullcontext() if fits else pytest.raises(SystemExit):
+        imported(hull, mass=mass)
+
+
+def test_open_surfaces_and_other_files_are_refused(refused, tmp_path, monkeypatch, capsys):
     hull = trimesh.creation.icosphere(2)
     hull.update_faces(np.linalg.norm(hull.triangles_center - [1, 0, 0], axis=1) > 0.6)
     line = refused(trimesh.util.concatenate([sphere(1, at=(3, 0, 0)), hull]), *SAID)
@@ -253,6 +301,15 @@ def test_open_surfaces_and_other_files_are_refused(refused, tmp_path, capsys):
     with pytest.raises(SystemExit):
         main(['import-vehicle', str(tmp_path / 'list.m'), '--units', 'mm'])
     assert '--units: expected a mesh' in capsys.readouterr().err
+    line = refused(trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]] * 3), *SAID)
+    assert 'expected 4 to 1000000 triangles of finite numbers, found 3 triangles' in line
+    monkeypatch.setattr(mesh_import, 'LARGEST_FILE', 1 << 20)
+    (tmp_path / 'large.ply').write_bytes(bytes((1 << 20) + 1))
+    for name, said in (('large.ply', 'at most 1 MB, found 1048577 bytes'),
+                       ('gone.ply', 'a mesh, found no such file')):  # fmt: skip
+        with pytest.raises(SystemExit):
+            main(['import-vehicle', name, *SAID])
+        assert said in capsys.readouterr().err
     (tmp_path / 'bad.ply').write_text('ply\nnonsense')
     with pytest.raises(SystemExit):
         main(['import-vehicle', str(tmp_path / 'bad.ply'), *SAID])

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from auv_analysis.watch import monitor as module
 from auv_analysis.watch.monitor import (
     HEARD,
     KEPT,
@@ -59,12 +60,15 @@ def test_a_snapshot_is_plain_json_without_and_with_everything() -> None:
     monitor = GraphMonitor(0, vehicle=load_vehicle('herman2018'))
     json.dumps(monitor.snapshot(0.0).document(), allow_nan=False)
     for k in range(30):
-        monitor.hear(k / 10, interface.CMD_VEL, k, k * STEP, (0.3,) * 6)
+        monitor.hear(k / 10, interface.CMD_VEL, 2 * k, k * STEP, (0.3,) * 6)
         monitor.hear(k / 10, interface.ODOM, k, k * STEP, STATE)
         monitor.hear(k / 10, interface.WRENCH, k, k * STEP, (1.0,) * 6)
         monitor.hear(k / 10, interface.PROGRESS, k, k * STEP, None)
     found = json.loads(json.dumps(monitor.snapshot(2.9).document(), allow_nan=False))
     assert found['velocity_error']['now'] == pytest.approx([0.2] * 6)
+    assert (found['nu'], found['nu_d'], found['tau']) == ([0.1] * 6, [0.3] * 6, [1.0] * 6)
+    command = next(entry for entry in found['topics'] if entry['name'] == interface.CMD_VEL)
+    assert (command['heard'], command['published'], command['age']) == (30, 59, 0.0)
     assert found['computed'] is True
     assert found['time'] == found['recorded'] == pytest.approx(0.29)
     assert found['pace'] == pytest.approx(0.1)
@@ -149,6 +153,16 @@ def test_nodes_that_complain_and_nodes_that_fall_silent() -> None:
     levels = {node.name: node.level for node in monitor.snapshot(4.0).nodes}
     assert levels == {'/plant_node': 'stale', '/controller_node': 'ok'}
     assert monitor.snapshot(2.0 + KEPT).nodes == ()
+
+
+def test_of_many_nodes_those_that_spoke_last_are_kept(monkeypatch) -> None:
+    monkeypatch.setattr(module, 'MOST', 2)
+    monitor = GraphMonitor(0)
+    for now, name in enumerate('abac'):
+        monitor.diagnose(now, NodeState(name, 'ok', 'ok', 0.0))
+        monitor.complain(now, name)
+    assert [(node.name, node.age) for node in monitor.snapshot(3.0).nodes] == [('a', 1), ('c', 0)]
+    assert [(one.text, one.count) for one in monitor.snapshot(3.0).alerts] == [('c', 1), ('a', 2)]
 
 
 def test_errors_of_nodes_come_before_their_warnings() -> None:

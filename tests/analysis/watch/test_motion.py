@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from auv_analysis.metrics.coupling import LiveAnalysis
+from auv_analysis.watch import monitor
 from auv_analysis.watch.monitor import FRESH, HELD_NS, LiveMotion
 from auv_dynamics import load_vehicle
 from auv_dynamics.ros import interface
@@ -91,6 +92,17 @@ def test_the_lumped_error_is_of_one_stamp(F: tuple, f: tuple) -> None:
     assert motion.lumped(0.0) is None
     motion.hear(0.0, interface.DISTURBANCE_ESTIMATE, 0, f)
     assert_allclose(motion.lumped(0.0), np.subtract(f, F))
+
+
+def test_of_what_waits_for_its_other_half_the_newest_is_kept(monkeypatch) -> None:
+    monkeypatch.setattr(monitor, 'PENDING', 3)
+    motion = LiveMotion()
+    for k in range(5):
+        motion.hear(0.0, interface.DISTURBANCE, k * STEP, (float(k),) * 6)
+    motion.hear(0.0, interface.DISTURBANCE_ESTIMATE, STEP, TAU)
+    assert motion.lumped(0.0) is None
+    motion.hear(0.0, interface.DISTURBANCE_ESTIMATE, 2 * STEP, TAU)
+    assert motion.lumped(0.0) == (8.0,) * 6
 
 
 @QUICK

@@ -5,7 +5,7 @@ from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_analysis.watch.monitor import WINDOW, Stream
+from auv_analysis.watch.monitor import ENOUGH, WINDOW, Stream
 
 STEP = 10_000_000  # ns
 PERIOD = 0.01  # s of the wall between two messages
@@ -79,6 +79,27 @@ def test_stamps_that_come_twice_are_counted(twice: set[int]) -> None:
     ks = sorted([*range(120), *twice])
     hear(stream, ks, number=lambda i: i + 1)
     assert (stream.gaps, stream.repeats) == (0, len(twice))
+
+
+def test_a_stamp_that_goes_back_is_a_repeat_where_no_number_is_missing() -> None:
+    stream = Stream()
+    hear(stream, range(20))
+    assert not stream.hear(1.0, 21, 5 * STEP)
+    assert (stream.gaps, stream.repeats) == (0, 1)
+
+
+@pytest.mark.parametrize(('before', 'gaps'), [(ENOUGH, 0), (ENOUGH + 1, 2)])
+def test_a_gap_is_told_after_enough_steps(before: int, gaps: int) -> None:
+    stream = Stream()
+    hear(stream, [*range(before), before + 2], number=lambda i: i + 1)
+    assert stream.gaps == gaps
+
+
+def test_messages_of_one_moment_have_no_time_between_them() -> None:
+    stream = Stream()
+    for k, now in enumerate((0.0, 0.0, 0.0, 1.0)):
+        stream.hear(now, k, k * STEP)
+    assert (stream.rate(1.0), stream.pace(1.0)) == (1.0, 0.01)
 
 
 def test_an_uneven_driver_has_no_gaps() -> None:

@@ -333,10 +333,12 @@ def files() -> Iterator[Finding]:
     """How many files a process may open: a participant takes some dozens."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     limit = hard if soft == resource.RLIM_INFINITY else soft
-    good = limit == resource.RLIM_INFINITY or limit > FEW_FILES
-    verdict = 'ok' if good else _judged(limit, LEAST_FILES, FEW_FILES - 1)
+    if limit == resource.RLIM_INFINITY:
+        yield Finding('open files', 'ok', 'no limit')
+        return
+    verdict = _judged(limit, LEAST_FILES, FEW_FILES - 1)
     advice = '' if verdict == 'ok' else f'ulimit -n {FEW_FILES}'
-    found = 'no limit' if limit == resource.RLIM_INFINITY else f'{limit} per process'
+    found = f'{limit} per process'
     yield Finding('open files', verdict, found, advice)
 
 

@@ -216,7 +216,6 @@ class LiveMotion:
         self.nu_d: Six | None = None
         self.tau: Six | None = None
         self.lumped_error: Six | None = None
-        self._trend = Trend()
         self._paired = -math.inf  # when a velocity was last heard together with its set-point
         self._stamps: list[int] = []
         self._setpoints: list[Six] = []
@@ -251,9 +250,8 @@ class LiveMotion:
             self.ns, self.nu, self.nu_d = ns, nu, nu_d
 
     def _keep_setpoint(self, ns: int, values: Six) -> None:
-        if self._stamps and ns <= self._stamps[-1]:
-            del self._stamps[bisect_right(self._stamps, ns - 1) :]
-            del self._setpoints[len(self._stamps) :]
+        del self._stamps[bisect_right(self._stamps, ns) :]  # of an earlier run
+        del self._setpoints[len(self._stamps) :]
         self._stamps.append(ns)
         self._setpoints.append(values)
         if len(self._stamps) >= 2 * CAPACITY:
@@ -283,7 +281,7 @@ class LiveMotion:
 
     def published(self, now: float, topic: str) -> Six | None:
         """Newest numbers of an analysis topic, while it is alive."""
-        at, values = self._published.get(topic, (-math.inf, None))
+        at, values = self._published.get(topic, (now, None))
         return values if now - at < FRESH else None
 
     def energy(self, now: float) -> Energy | None:

@@ -5,6 +5,7 @@ The reader is called directly here; `test_bad_files` goes through the command.
 
 import copy
 import json
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,7 +21,15 @@ from hypothesis import strategies as st
 from auv_analysis import load_scenario
 from auv_dynamics import load_vehicle
 from auv_dynamics.files import yaml_files
-from auv_dynamics.files.errors import InputError, reason, shorten
+from auv_dynamics.files.errors import (
+    MARK,
+    InputError,
+    first_line,
+    named_line,
+    printable,
+    reason,
+    shorten,
+)
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import (
     check,
@@ -157,12 +166,56 @@ def test_a_text_that_is_too_long_is_refused_before_it_is_read() -> None:
         parse_any_yaml('#' * ((4 << 20) + 1), 'a text')
 
 
+@pytest.mark.parametrize(('most', 'piece'), [(20, 4), (19, 19), (20, 64), (19, 64)])
+def test_a_file_is_read_in_pieces_as_far_as_it_may_be_long(most, piece, tmp_path, monkeypatch):
+    monkeypatch.setattr(yaml_files, 'LARGEST_FILE', most)
+    monkeypatch.setattr(yaml_files, 'PIECE', piece)
+    path = tmp_path / 'long.yaml'
+    path.write_text('name: twenty letters')
+    if most == 20:
+        assert read_text(path, 'vehicle') == 'name: twenty letters'
+    else:
+        with pytest.raises(InputError, match=r'a vehicle file, found more than 19 bytes'):
+            read_text(path, 'vehicle')
+
+
+def test_entries_and_levels_are_counted(monkeypatch) -> None:
+    monkeypatch.setattr(yaml_files, 'MOST_ENTRIES', 60)
+    for entries in (58, 59):  # beside the list and what it is in
+        text = f'{{few: [{", ".join(map(str, range(entries)))}]}}'
+        if entries == 58:
+            assert parse_any_yaml(text, 'f') == {'few': list(range(58))}
+        else:
+            with pytest.raises(InputError, match='at most 60 entries with all aliases'):
+                parse_any_yaml(text, 'f')
+
+
+def test_a_path_is_taken_as_it_is_and_a_bare_name_is_looked_up(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for path in ('a.yaml', 'a.yml', 'there/rexrov'):
+        assert shipped('vehicles', path) == Path(path)
+    known = shipped('vehicles', 'rexrov')
+    assert (known.name, known.is_file()) == ('rexrov.yaml', True)
+    (tmp_path / 'rexrov').touch()
+    assert shipped('vehicles', 'rexrov') == Path('rexrov')
+
+
 def test_what_was_found_is_shown_in_short() -> None:
     assert shorten([1234] * 10) == repr([1234] * 10), 'sixty characters'
     assert shorten([12345] * 10) == f'{[12345] * 10!r:.57}...'
     error = InputError('a\x1b[2J', 'key', 'less', 'm' * 201)
     assert error.found == f'{"m" * 197}...'
     assert str(error) == f'a\N{REPLACEMENT CHARACTER}[2J: key: expected less, found {error.found}'
+    assert str(InputError('a', '', 'less', None)) == 'a: expected less, found nothing'
+    words = ['rexrov', 'a: b/c', '1', 'end ', 'w' * 57, 'w' * 58]
+    assert [shorten(word) for word in words] == [
+        'rexrov', 'a: b/c', "'1'", "'end '", 'w' * 57, f"'{'w' * 26}...{'w' * 26}'"
+    ]  # fmt: skip
+    assert first_line(ValueError('a\nb')) == 'a'
+    assert first_line(ValueError()) == 'ValueError'
+    assert named_line(ValueError('a\nb')) == 'ValueError: a'
+    signs = '\x07\u202e\ud800\ue000\u2028\u2029'
+    assert printable(f'a{signs}\n\u00e9') == 'a' + len(signs) * MARK + '\n\u00e9'
     assert reason(OSError(13, 'Permission denied')) == 'permission denied'
     assert reason(OSError('Odd')) == 'odd'
 
@@ -178,6 +231,7 @@ THREE = {'title': 'a file', 'type': 'object', 'required': ['a'], 'additionalProp
         ({'b': 'x', 'd': 1}, 'd: expected one of a, b, c.*, found an unknown key'),
         ({'b': 'x'}, 'b: expected a number, found x'),
         ({'b': 1}, 'a: expected a number, found nothing'),
+        ({'a': math.inf}, 'a: expected a finite number, found inf'),
         ({'a': 2e100}, r'a: expected a finite number, at most 1e\+100'),
         ({'a': [[1, 2, 3]] * 2}, r'a: expected a number, found 2x3 \['),
         ({'a': [[1], [1, 2, 3], [1, 2]]}, 'found 3 rows of 1 to 3 entries'),

@@ -46,3 +46,8 @@ def test_a_signal_that_has_waited_does_what_it_would_have_done(number) -> None:
     with undisturbed():
         signal.raise_signal(number)
     assert signal.getsignal(number) == signal.SIG_IGN
+    heard: list[int] = []
+    with on_signals(lambda: heard.append(number)):
+        signal.raise_signal(number)
+        signal.raise_signal(ENDING[number == ENDING[0]])
+    assert heard == [number] * (1 + (number != signal.SIGHUP)), 'which `nohup` lets be ignored'

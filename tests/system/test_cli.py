@@ -314,6 +314,7 @@ def test_info(recording, capsys) -> None:
         'messages': 5,
     }
     assert document['files'] == ['gvc_0.mcap']
+    assert (document['candidates'], document['mapping']) == ({}, '')
     assert document['attachments'] == ['params.yaml', 'scenario.yaml', 'vehicle.yaml']
     assert document['notes'] == []
 

@@ -15,6 +15,8 @@ from auv_analysis.bag.step_topics import ODOMETRY, TWIST, WRENCH
 from auv_analysis.cli import analyze, main
 from auv_analysis.cli.arguments import topic_map
 from auv_analysis.output.folder import sha256_of, write_manifest
+from auv_analysis.studies.compare import sources
+from auv_analysis.studies.sweep import report
 from auv_dynamics.files.errors import InputError
 
 
@@ -28,21 +30,21 @@ def test_every_bag_is_read_once_and_shows_its_own_files(tmp_path, monkeypatch) -
     )
     main.main(['analyze', *map(str, bags), '--out', str(tmp_path / 'out')])
     assert read == ['case1_0.mcap', 'case2_0.mcap', 'case1_rexrov_0.mcap']
-    report = unescape((tmp_path / 'out' / 'report.html').read_text(encoding='utf-8'))
+    page = unescape((tmp_path / 'out' / 'report.html').read_text(encoding='utf-8'))
     for bag in bags:
-        assert f'name: {bag.name}\n' in report
-        assert f'Set-up of {bag.name}: ' in report
-    assert 'The other scenarios’ files are not shown' not in report
-    assert report.count('<summary>Vehicle file of ') == 2, 'case1 and case2 share theirs'
+        assert f'name: {bag.name}\n' in page
+        assert f'Set-up of {bag.name}: ' in page
+    assert 'The other scenarios’ files are not shown' not in page
+    assert page.count('<summary>Vehicle file of ') == 2, 'case1 and case2 share theirs'
 
 
 @pytest.mark.usefixtures('unrendered')
 def test_equal_files_are_shown_once(tmp_path) -> None:
     bag = make_bag(tmp_path / 'case1', 300)
     main.main(['analyze', str(bag), str(bag), '--out', str(tmp_path / 'out')])
-    report = (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')
-    assert report.count('<summary>Scenario file</summary>') == 1
-    assert report.count('<summary>Vehicle file</summary>') == 1
+    page = (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')
+    assert page.count('<summary>Scenario file</summary>') == 1
+    assert page.count('<summary>Vehicle file</summary>') == 1
 
 
 @pytest.mark.parametrize(
@@ -50,6 +52,7 @@ def test_equal_files_are_shown_once(tmp_path) -> None:
     [
         (['one'], 'one'),
         (['one', 'other', 'one'], 'one_other'),
+        (['one', 'two', 'three'], 'one_two_three'),
         (['one', 'two', 'three', 'four'], 'one_and_3_more'),
         (['x' * 60, 'y' * 60], f'{"x" * 60}_and_1_more'),
         (['x' * 90], 'x' * 90),
@@ -60,6 +63,23 @@ def test_results_are_named_after_the_scenarios(scenarios, folder, tmp_path, monk
     with analyze._folder(scenarios, [], Namespace(out=None, map=None, overwrite=False)):
         pass
     assert [path.name for path in Path('runs').iterdir()] == [f'analyze_{folder}']
+
+
+def test_three_runs_are_shown_one_by_one_and_more_side_by_side(monkeypatch) -> None:
+    monkeypatch.setattr(sources, 'sources_of', lambda results, *_: results)
+    for name in ('_few', '_many'):
+        monkeypatch.setattr(analyze, name, lambda *_, name=name: name)
+    grammar = main.parser()
+    found = [analyze.run(grammar.parse_args(['analyze', *'abcd'[:count]])) for count in (3, 4)]
+    assert found == ['_few', '_many']
+
+
+def test_a_sweep_is_explored_as_it_was_asked_for(monkeypatch) -> None:
+    monkeypatch.setattr(sources, 'is_sweep', lambda _: True)
+    monkeypatch.setattr(report, 'explore', lambda folder, **chosen: (folder, chosen))
+    told = 'analyze', 'swept', '--by', 'energy', '--out', 'out', '--overwrite'
+    found = analyze.run(main.parser().parse_args(told))
+    assert found == (Path('swept'), {'out': Path('out'), 'by': 'energy', 'overwrite': True})
 
 
 def test_the_mapping_file_that_is_read_is_never_replaced(tmp_path) -> None:

@@ -27,6 +27,7 @@ def test_where_nothing_was_run_the_first_experiments_are_proposed(folder, capsys
     text = _said(capsys)
     for line in ('auv simulate case1', 'auv run case1', 'auv new vehicle', 'auv doctor'):
         assert line in text
+    assert text.startswith('Nothing has been run here yet.')
     assert not list(folder.iterdir())
 
 
@@ -42,6 +43,8 @@ def test_results_are_proposed_to_be_looked_at_the_newest_first(folder, capsys):
             file.touch()
     os.utime(folder / 'runs' / 'first', (1, 1))
     text = _said(capsys)
+    assert text.startswith('What could come next:')
+    assert 'auv new vehicle NAME' in text, 'as there is no file'
     assert 'runs/second/report.html' in text
     assert 'auv replay runs/second/gvc' in text
     assert 'auv analyze runs/first runs/second' in text
@@ -63,7 +66,11 @@ def test_results_are_proposed_to_be_looked_at_the_newest_first(folder, capsys):
 )
 def test_files_at_hand_are_proposed_by_what_they_are(text, line, folder, capsys):
     (folder / 'mine.yaml').write_text(text)
-    assert line in _said(capsys)
+    (folder / 'notes.txt').write_text('controllers: {}')
+    said = _said(capsys)
+    assert line in said
+    assert ('mine.yaml' in said) != ('auv new vehicle NAME' in said)
+    assert 'notes.txt' not in said
 
 
 def test_of_many_files_a_few_are_proposed(folder, capsys):

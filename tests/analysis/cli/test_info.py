@@ -1,5 +1,12 @@
 """What `auv info` prints: each count beside its topic, each range beside its field."""
 
+import json
+from pathlib import Path
+
+from helpers.damaged_bags import UPRIGHT
+from helpers.made_messages import ODOMETRY, SECOND, STRING, Bag, odometry, serialized
+
+from auv_analysis.cli import main
 from auv_analysis.cli.info import _print_info
 
 DOCUMENT = {
@@ -50,3 +57,21 @@ def test_what_a_bag_does_not_have_is_left_out(capsys) -> None:
     assert bare[0][-2:] == ['no', 'messages']
     assert ['attachments:', 'none'] in bare
     assert [words[0] for words in bare[4:]] == ['attachments:', 'could']
+
+
+def test_a_topic_that_was_silent_is_listed_with_none(tmp_path: Path, capsys) -> None:
+    bag = Bag(tmp_path / 'some.mcap')
+    bag.channel('/silent', STRING)
+    for second in (5, 6, 8):
+        ns = second * SECOND
+        bag.add('/odom', ODOMETRY, ns, serialized(odometry(ns, UPRIGHT)))
+    main.main(['info', str(bag.close()), '--json'])
+    document = json.loads(capsys.readouterr().out)
+    assert document['topics'] == {
+        '/odom': {'type': ODOMETRY, 'messages': 3},
+        '/silent': {'type': STRING, 'messages': 0},
+    }
+    assert (document['messages'], document['duration']) == (3, 3.0)
+    assert (document['files'], document['attachments']) == (['some.mcap'], [])
+    assert document['candidates']['odometry'] == ['/odom']
+    assert 'topic: /odom' in document['mapping']

@@ -5,6 +5,7 @@ from argparse import Namespace
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
 from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
@@ -76,9 +77,31 @@ def test_units_window_and_set_up_are_said() -> None:
     text = text_of({'mine': summary()})
     lines = text.splitlines()
     assert lines[0].strip() == 'mine: law gvc, 30 s in steps of 0.01 s, by bag'
-    assert lines[3].split('  ')[-1].strip() == 'N,N m'
+    heads = [' '.join(line.split()) for line in (*lines[1:4], *lines[10:13])]
+    assert heads == [
+        'error error settled w = f - F w = f - F tau tau',
+        'rms max > 2 s rms max > 2 s rms max',
+        'm,rad/s m,rad/s s N,N m N,N m N,N m N,N m',
+        'delta_xi delta_pi energy share',
+        'max max mean',
+        'm,rad/s N,N m J %',
+    ]
+    assert 'not settled' not in text
     for words in ('m,rad/s', 'kinetic energy 402.45 J, mean over 0 to 10 s', 'max > 2 s'):
         assert words in text
+
+
+@pytest.mark.parametrize(
+    ('kind', 'name'), [('unexplained', 'F by (1)'), ('required_wrench', 'required')]
+)
+def test_what_was_estimated_has_a_table_of_its_own(kind: str, name: str) -> None:
+    keys = 'mean', 'rms', 'max', 'error_rms'
+    made = {key: [10.0 * i + k for i, _ in enumerate(DOFS)] for k, key in enumerate(keys, 1)}
+    text = text_of({'gvc': summary(**{kind: made})})
+    assert ' '.join(text.splitlines()[19].split()) == ' '.join([name] * 4)
+    assert text.splitlines()[20].split() == ['mean', 'rms', 'max', 'error']
+    expected = [[number(made[key][i]) for key in keys] for i, _ in enumerate(DOFS)]
+    assert rows(text)[2] == expected
 
 
 def test_bars_are_as_long_as_the_shares() -> None:

@@ -69,7 +69,8 @@ vehicle: rexrov
 duration: 4
 step: 1
 seed: 3.0
-initial: {eta: [1, 0, 0, 0, 0, 0]}
+integrator: rk4
+initial: {eta: [1, 0, 0, 0, 0, 0], nu: [0, 2, 0, 0, 0, 0]}
 controllers:
   mine: {law: cl, k_D: 12, k_I: [1, 2, 3, 4, 5, 6], Lambda: 1, Gamma: 60}
 setpoint: {surge: {offset: 1, terms: [{amplitude: 1, omega: 2}, {amplitude: 3, omega: 4}]}}

@@ -195,7 +195,7 @@ def test_the_curve_of_a_rotor_counts_where_it_is_of_pulses(
 
 def test_motors_by_the_option() -> None:
     thrusters = load_vehicle('bluerov2').thrusters
-    motors, text = make_motors(thrusters, '2,-T1,3,4,6,5', 16)
+    motors, text = make_motors(thrusters, '2, -T1,3,4,6,5', 16)
     assert 'T2, T1 reversed, T3, T4, T6, T5' in text
     u = motors.thrusts(np.array([1900.0, 1900, 0, 0, 0, 1100] + [0.0] * 26))
     assert u == pytest.approx([-40.2, 51.5, 0, 0, -40.2, 0], rel=0.01)
@@ -206,6 +206,7 @@ def test_thrusters_of_no_known_frame_are_taken_in_their_order(tmp_path: Path) ->
     motors, text = make_motors(load_vehicle(path).thrusters, None, 16)
     assert 'no frame that is known here' in text
     assert motors.channels.tolist() == [0, 1, 2, 3, 4]
+    assert not motors.reversed.any()
 
 
 def test_a_frame_is_matched_only_where_every_sign_is_right(tmp_path: Path) -> None:

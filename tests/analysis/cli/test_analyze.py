@@ -72,6 +72,8 @@ def test_three_runs_are_shown_one_by_one_and_more_side_by_side(monkeypatch) -> N
     grammar = main.parser()
     found = [analyze.run(grammar.parse_args(['analyze', *'abcd'[:count]])) for count in (3, 4)]
     assert found == ['_few', '_many']
+    with pytest.raises(InputError, match=r'^--law: expected .*nearest: gvc'):
+        analyze.run(grammar.parse_args(['analyze', 'a', '--law', 'gvcc']))
 
 
 def test_a_sweep_is_explored_as_it_was_asked_for(monkeypatch) -> None:

@@ -12,7 +12,7 @@ from auv_analysis.cli import main, study
 from auv_analysis.graph import domain, recorded_runs
 from auv_analysis.simulation import simulate
 from auv_analysis.studies.study import sensitivity
-from auv_dynamics.files.errors import FailedError
+from auv_dynamics.files.errors import FailedError, InputError
 
 GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
 SCENARIO = {'name': 's', 'vehicle': 'herman2018', 'duration': 1.0, 'step': 0.01, 'setpoint': {}}
@@ -48,6 +48,15 @@ def test_a_study_on_the_nodes_is_one(tmp_path: Path, monkeypatch, capsys) -> Non
         main.main(['study', 'case1', *options])
     assert (end.value.code, 'enough' in capsys.readouterr().err) == (1, True)
     assert asked == ['zoh', ((7, False), True)]
+
+
+def test_a_window_lies_in_the_run_and_has_a_length() -> None:
+    made = SimpleNamespace(duration=0.3, step=0.1)
+    for whole in ((0.0, 0.3), (0.0, 0.1 + 0.2)):
+        assert study._window(made, *whole) == whole
+    for wrong in ((-0.1, 0.3), (0.0, 0.4), (0.2, 0.2), (0.2, 0.1)):
+        with pytest.raises(InputError, match='--window: expected two times'):
+            study._window(made, *wrong)
 
 
 def test_why_there_is_no_sensitivity_is_said(monkeypatch, capsys) -> None:

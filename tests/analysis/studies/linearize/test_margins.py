@@ -14,6 +14,7 @@ import yaml
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate
+from auv_analysis.cli import linearize
 from auv_analysis.cli.main import main
 from auv_analysis.cli.scenario_runs import warn
 from auv_analysis.studies.linearize import margins
@@ -25,7 +26,7 @@ from auv_analysis.studies.linearize.margins import (
     stable,
 )
 from auv_analysis.studies.linearize.sampled_loop import behind_rotors
-from auv_dynamics.files.errors import FailedError
+from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.thrusters import Rotor
 
@@ -393,6 +394,8 @@ def test_a_delay_of_many_steps_leaves_the_poles(tmp_path, capsys):
     said = capsys.readouterr()
     assert 'no margins beyond 100 steps' in said.err
     assert 'pole, 1/s' in said.out
+    assert 'not in these models: actuators' in said.out
+    assert linearize._is_soon(load_scenario(path), 0.1), 'a delay that was given counts'
 
 
 @pytest.mark.usefixtures('unrendered')
@@ -438,6 +441,19 @@ def test_the_command_prints_margins_and_writes_them(tmp_path, monkeypatch, capsy
         main([*line, '--nu0', *'123456', '--attitude', *'789'])
     moving, _ = asked[-1]
     assert (moving.nu0, moving.eta0) == ([1, 2, 3, 4, 5, 6], [0, 0, 0, 7, 8, 9])
+
+
+@pytest.mark.parametrize(
+    ('seconds', 'known'), [(0, True), (0.5, True), (-0.1, False), ('1', False)]
+)
+def test_a_delay_that_was_measured_may_be_none_and_is_never_negative(seconds, known, tmp_path):
+    path = tmp_path / 'check.json'
+    path.write_text(json.dumps({'command_to_response_delay': {'seconds': seconds}}))
+    if known:
+        assert linearize.measured_delay(path) == seconds
+    else:
+        with pytest.raises(InputError, match=r'delay\.seconds: expected a delay in s'):
+            linearize.measured_delay(path)
 
 
 @pytest.mark.parametrize(

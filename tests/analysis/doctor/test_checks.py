@@ -301,6 +301,15 @@ def test_what_keeps_participants_apart_is_what_the_loopback_lacks(
     assert [part[: len(begin)] for part, begin in zip(parts, advice, strict=True)] == advice
 
 
+@pytest.mark.parametrize(('second', 'verdict'), [(0.71, 'ok'), (None, 'broken')])
+def test_participants_have_to_find_each_other_both(second, verdict, monkeypatch):
+    took = {discovery.FIRST: 0.2, discovery.SECOND: second}
+    monkeypatch.setattr(discovery, '_start', lambda *given: given)
+    monkeypatch.setattr(discovery, '_answer', lambda given: {'took': took[given[1]]})
+    found = _one(discovery.discovery, verdict)
+    assert ('each other in 0.7 s' in found.found) == (second is not None)
+
+
 def test_who_is_in_a_domain_matters_where_it_was_chosen(monkeypatch):
     asked = []
     monkeypatch.setattr(discovery, '_start', lambda *given: asked.append(given[-1]))

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import psutil
 import pytest
+import yaml
 
 from auv_analysis import load_scenario
 from auv_analysis.bag.metadata import METADATA, as_text
@@ -79,6 +80,8 @@ def test_a_recorder_that_a_signal_ends_has_not_finished_the_run(
     with pytest.raises(NodeDiedError, match='ended at step 7 of 3000'):
         run_controller(*given, composed=composed)
     assert steps == [7]
+    told = yaml.safe_load((tmp_path / 'gvc' / 'params.yaml').read_text())
+    assert told['/**/plant_node']['ros__parameters']['start_paused'], 'until all are there'
 
 
 def test_a_run_that_is_paused_goes_on(tmp_path: Path) -> None:

@@ -41,6 +41,16 @@ def test_who_ends_is_named_with_its_last_words_and_what_the_others_complain_of(
     assert str(caught.value).splitlines() == ['node ended with exit code 3', *told]
 
 
+def test_who_only_observes_gives_way(tmp_path: Path, monkeypatch) -> None:
+    given = []
+    monkeypatch.setattr(supervisor, 'give_way', given.append)
+    group = supervisor.Supervisor(tmp_path, os.environ, lambda *_, **__: SimpleNamespace(pid=7))
+    group.start('plant', ['true'])
+    assert given == []
+    group.start('recorder', ['true'], observes=True)
+    assert given == [7]
+
+
 @pytest.mark.parametrize(
     ('writes', 'takes', 'code'), [('recorder', 0.5, 7), ('', 600, -signal.SIGKILL)]
 )

@@ -4,6 +4,7 @@ Whatever a user keeps in or beside it, the recordings and files that a command w
 outlives the command.
 """
 
+import math
 import shutil
 import signal
 import subprocess
@@ -19,11 +20,17 @@ from auv_analysis.graph import recorded_runs
 from auv_analysis.output.folder import (
     check_free,
     has_links,
+    listed_in,
     results_folder,
     sha256_of,
     write_manifest,
 )
-from auv_analysis.output.new_files import replacing, unfinished_name, write_text
+from auv_analysis.output.new_files import (
+    arrow_table,
+    replacing,
+    unfinished_name,
+    write_text,
+)
 from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.files.shipped import shipped
 
@@ -110,15 +117,19 @@ FOREIGN = [
     '[]',
     '{"name": "My app"}',
     'x',
-    '{"files": {"../x": "1"}}',
-    '{"files": {"/x": "1"}}',
+    '{"files": {"../x": "DIGEST"}}',
+    '{"files": {"/x": "DIGEST"}}',
+    '{"files": {"gvc//x": "DIGEST"}}',
 ]
 
 
 @pytest.mark.parametrize('text', FOREIGN)
 def test_manifest_of_somebody_else_lists_nothing(text: str, tmp_path: Path) -> None:
-    fill(tmp_path, {'out/manifest.json': text, 'x': 'mine'})
+    fill(tmp_path, {'x': 'mine'})
+    listed = text.replace('DIGEST', sha256_of(tmp_path / 'x'))  # as it is: it has not changed
+    fill(tmp_path, {'out/manifest.json': listed})
     refused(tmp_path / 'out', overwrite=True)
+    assert listed_in(tmp_path / 'out') is None
     assert (tmp_path / 'x').read_text() == 'mine'
 
 
@@ -206,6 +217,43 @@ def test_command_that_does_not_come_to_its_end_leaves_the_results(end, tmp_path:
         write(tmp_path, {'summary.json': 'half'}, overwrite=True, end=end)
     assert tree(tmp_path) == before
     write(tmp_path, LATER, overwrite=True)
+
+
+def test_of_what_replaces_results_a_failure_leaves_rollouts_and_summaries_alone(tmp_path) -> None:
+    failed, stopped = FailedError('no'), KeyboardInterrupt()
+    rollouts, summary, figure = 'rollouts/part-00000000.parquet', 'summary.json', 'figures/nu.png'
+    write(tmp_path, EARLIER)
+    for end, name, kept in (
+        (stopped, rollouts, True), (failed, rollouts, True),
+        (stopped, summary, False), (failed, summary, True), (failed, figure, False),
+    ):  # fmt: skip
+        with pytest.raises(type(end)):
+            write(tmp_path, {name: 'new'}, overwrite=True, end=end)
+        assert (tmp_path / 'unfinished' / name).is_file() == kept
+        assert EARLIER.items() <= tree(tmp_path).items()
+        shutil.rmtree(tmp_path / 'unfinished', ignore_errors=True)
+
+
+def test_a_file_where_a_folder_must_go_stops_the_exchange_before_it_begins(tmp_path) -> None:
+    def work() -> None:
+        with results_folder(tmp_path, overwrite=True, own=OWN) as results:
+            fill(results.folder, LATER)
+            (tmp_path / 'gvc').write_text('mine')
+
+    write(tmp_path, {'summary.json': 'old'})
+    with pytest.raises(FailedError, match='expected no such file'):
+        work()
+    assert (tmp_path / 'summary.json').read_text() == 'old'
+    assert (tmp_path / 'gvc').read_text() == 'mine'
+
+
+def test_a_link_among_the_results_is_none_of_them(tmp_path: Path) -> None:
+    (tmp_path / 'mine').write_text('mine')
+    with results_folder(tmp_path / 'out', overwrite=False) as results:
+        fill(results.folder, {'summary.json': 'new', 'figures/nu.png': 'new'})
+        (results.folder / 'figures' / 'tau.png').symlink_to(tmp_path / 'mine')
+    listed = listed_in(tmp_path / 'out')
+    assert sorted(listed or ()) == ['figures/nu.png', 'manifest.json', 'summary.json']
 
 
 KILLED = """
@@ -338,6 +386,29 @@ def test_no_file_is_written_through_a_link(tmp_path: Path) -> None:
     assert not victim.exists()
     assert {path.name for path in tmp_path.iterdir()} == {target.name}
     assert target.read_text() == 'new'
+
+
+def test_of_a_link_to_a_folder_the_link_alone_is_replaced(tmp_path: Path) -> None:
+    target, folder, source = (tmp_path / name for name in ('out.yaml', 'folder', 'mine.yaml'))
+    fill(tmp_path, {'folder/file': 'mine', 'mine.yaml': 'mine'})
+    with pytest.raises(InputError, match='found what is no file'):
+        write_text(folder, 'new', overwrite=True)
+    target.symlink_to(folder)
+    write_text(target, 'new', overwrite=True)
+    assert tree(tmp_path) == {'folder/file': 'mine', 'mine.yaml': 'mine', 'out.yaml': 'new'}
+    with pytest.raises(InputError, match='another file than the one that is read'):
+        write_text(folder / '..' / 'mine.yaml', 'new', overwrite=True, inputs=[source])
+
+
+def test_columns_are_of_numbers_where_all_of_them_are() -> None:
+    columns = {
+        'whole': [1, 2], 'numbers': [1, 2.5], 'some': [1, None], 'none': [None, None],
+        'gap': [math.nan, 1.0], 'words': ['a', None], 'truths': [True, False],
+    }  # fmt: skip
+    table = arrow_table(columns)
+    kinds = [str(kind) for kind in table.schema.types]
+    assert kinds == ['int64', 'double', 'double', 'double', 'double', 'string', 'bool']
+    assert [table[name].null_count for name in columns] == [0, 0, 1, 2, 1, 1, 0]
 
 
 @pytest.mark.parametrize('overwrite', [False, True])

@@ -28,6 +28,16 @@ def test_q_ends_it_also_where_caps_are_locked(keys: int, key: bytes, ended: bool
     assert keyboard.ended == ended
 
 
+def test_a_terminal_that_is_closed_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    ours, its = pty.openpty()
+    with os.fdopen(its) as terminal:
+        monkeypatch.setattr(sys, 'stdin', terminal)
+        with Keyboard() as keyboard:
+            os.close(ours)
+            assert keyboard.wait(60.0) == b''
+    assert keyboard.ended
+
+
 @pytest.mark.usefixtures('keys')
 @pytest.mark.parametrize('behind', [0, 1])
 def test_a_command_in_the_background_asks_for_no_keys(behind: int, monkeypatch) -> None:

@@ -86,3 +86,15 @@ def test_what_it_does_not_give_is_done_here():
 
     with a_copy_beside(), meanwhile(fail) as made, pytest.raises(ValueError, match='here'):
         made()
+
+
+def test_a_copy_that_hangs_is_ended(monkeypatch):
+    monkeypatch.setattr(parallel, 'PATIENCE', 0.0)
+
+    def hang_beside():
+        while os.getpid() != HERE:
+            signal.pause()
+        return 7
+
+    with a_copy_beside(), meanwhile(hang_beside) as made:
+        assert made() == 7

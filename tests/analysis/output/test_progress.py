@@ -60,6 +60,8 @@ def test_bar_says_what_is_done_how_far_and_how_fast(terminal):
     assert 'runs' in text
     task = SimpleNamespace(finished_speed=None, speed=12.4)
     assert progress.Speed('steps').render(task).strip() == '12 steps/s'
+    task.finished_speed = 7.6
+    assert progress.Speed('steps').render(task).strip() == '8 steps/s'
 
 
 def test_no_terminal_shows_nothing_but_the_line_that_is_kept(monkeypatch):

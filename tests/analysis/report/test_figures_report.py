@@ -14,7 +14,7 @@ from PIL import Image
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.herman2018.claims import claims_part, judge_runs
 from auv_analysis.herman2018.paper import paper_figures
-from auv_analysis.output.text import capital, fixed, join, number, plain, tied
+from auv_analysis.output.text import capital, fixed, join, largest, number, plain, tied
 from auv_analysis.report import run_report
 from auv_analysis.report.plots import PALETTE, FigureRecord, style
 from auv_analysis.report.run_plots import draw_figures
@@ -326,6 +326,12 @@ def test_numbers_as_text():
     assert [number(x) for x in (0.0, 11479.1, -0.51912, 528.184, None, 3.921e-5, -np.inf)] == [
         '0', '11\u202f479', '−0.519', '528', '–', '3.92·10⁻⁵', '−∞',
     ]  # fmt: skip
+    assert [number(x) for x in (1.234e-4, 9.87e-5, 1234567.0, 12345678.0, np.inf, np.nan)] == [
+        '0.000123', '9.87·10⁻⁵', '1\u202f234\u202f567', '1.23·10⁷', '∞', '–',
+    ]  # fmt: skip
+    assert largest([1.0, None, 3.0, np.nan, 5.0, 4.0]) == 4
+    assert largest([1.0, None, 3.0, np.nan, 5.0, 4.0], range(3)) == 2
+    assert largest([None] * 6) is None
     assert [plain(x) for x in (12.0, 0.8, -0.025, 30000.0, 0)] == [
         '12', '0.8', '−0.025', '30\u202f000', '0',
     ]  # fmt: skip

@@ -174,6 +174,11 @@ def test_troubles_are_lines_of_their_own_and_end_where_the_terminal_does() -> No
     found = lines(replace(FULL, alerts=WRONG), 80, 24)
     assert 'error, 1.0 s ago: trouble 1' in [line.strip() for line in found]
     assert 'and more: 9 in all' in ' '.join(found)
+    low = ' '.join(lines(replace(FULL, alerts=WRONG), 80, 8))
+    assert 'trouble 1' in low
+    assert 'trouble 2' not in low
+    assert 'and more: 9 in all' in low
+    assert '2 times, 2.0 s ago: trouble 2' in ' '.join(lines(replace(FULL, alerts=WRONG[1:3]), 80))
     everything = lines(replace(FULL, alerts=WRONG), 80)
     assert sum('trouble' in line for line in everything) == 9
     assert 'nothing wrong seen' in ' '.join(lines(FULL, 80, 24))
@@ -215,6 +220,11 @@ def test_texts_of_numbers() -> None:
     assert [short(x) for x in (None, 0.0004, -0.0004, 12.345, 123.45, -11479.1, 2e6)] == [
         '–', '0.000', '0.000', '12.35', '123.5', '-11479', '2.0e+06'
     ]  # fmt: skip
+    assert [fixed(x) for x in (999.9, -1000.0)] == ['999.9000', '-1.0e+03']
+    assert [short(x) for x in (9.5, 10.0, 99.5, 100.0, 999.5, 1000.0, 999_999.0, 1e6)] == [
+        '9.500', '10.00', '99.50', '100.0', '999.5', '1000', '999999', '1.0e+06'
+    ]  # fmt: skip
+    assert [module.rate(x) for x in (None, 99.94, 99.96)] == ['–', '99.9', '100']
     assert [seconds(x) for x in (None, 0.04, 99.94, 250.0)] == ['–', '0.0 s', '99.9 s', '250 s']
     assert [stamp(x) for x in (12.345, 1_700_000_000.5)] == ['12.35 s', '22:13:20.5 UTC']
     assert [fact(x) for x in ('12345', '-3', '0.00012345', 'odom')] == [

@@ -4,7 +4,9 @@ import copy
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
+import json_backend
 import numpy as np
 import pytest
 import yaml
@@ -185,6 +187,23 @@ def scenario(folder: Path, **changes: Any) -> str:
     path = folder / 'reef.yaml'
     path.write_text(yaml.safe_dump(copy.deepcopy(SCENARIO) | changes))
     return str(path)
+
+
+def test_the_scenario_and_the_options_reach_the_physics(tmp_path: Path, monkeypatch) -> None:
+    physics, motors = Mock(), Mock(return_value=(None, ''))
+    monkeypatch.setattr(json_backend, 'Physics', physics)
+    monkeypatch.setattr(json_backend, 'make_motors', motors)
+    path = scenario(tmp_path, integrator='euler', step=0.02)
+    for told, integrator, eta in (
+        (['--scenario', path], 'euler', [0, 0, 10, 0, 0, 0.7]),
+        (['--vehicle', 'bluerov2_heavy', '--eta', *DEEP], 'rk4', [0, 0, 20, 0.1, -0.2, 1]),
+    ):
+        asked = [*told, '--motors', '2,1', '--voltage', '14.5']
+        json_backend.made(json_backend.options_of(asked))
+        assert motors.call_args.args[1:] == ('2,1', 14.5)
+        _, _, _, found, start, _, faults, _ = physics.call_args.args
+        assert (found, start[0].tolist(), start[1].tolist()) == (integrator, eta, [0] * 6)
+        assert faults[1] == (0.02 if integrator == 'euler' else 1.0)
 
 
 @pytest.mark.parametrize('rate', [50, 1200])

@@ -76,7 +76,6 @@ class Telemetry:
             came = -SECOND if message_id in self._slow else heard.get(message_id, -SECOND)
             if now - max(came, self._last.get(message_id, -SECOND)) < SECOND:
                 continue
-            self._slow.discard(message_id)
             self._last[message_id] = now
             self._unanswered, self._until = message_id, now + AGAIN
             self._order(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, period)

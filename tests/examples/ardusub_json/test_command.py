@@ -191,6 +191,15 @@ def test_the_curve_of_a_rotor_counts_where_it_is_of_pulses(
     # at the battery's voltage where none is told; of another unit: a T200's, scaled to the limits
     motors, _ = make_motors(load_vehicle(path).thrusters, None, 18)
     assert motors.thrusts(np.full(32, 1700.0)) == pytest.approx(20.0 * share)
+    for one in data['thrusters']:
+        one['rotor']['voltage'] = 16.0  # where it has one of its own, the battery's counts as well
+    path.write_text(yaml.safe_dump(data))
+    found = [
+        make_motors(load_vehicle(path).thrusters, None, voltage)[0].thrusts(np.full(32, 1700.0))[0]
+        for voltage in (None, 16, 18)
+    ]
+    assert found[0] == pytest.approx(found[1])
+    assert found[2] > 1.02 * found[1]
 
 
 def test_motors_by_the_option() -> None:

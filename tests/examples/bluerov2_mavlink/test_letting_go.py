@@ -119,8 +119,9 @@ def test_its_own_inputs_are_no_other_pilot(how: str, gain: float, heave: float) 
     pair = Pair(Booted(gain=gain), LinkSettings(how=how))
     pair.autopilot.parameters['JS_THR_GAIN'] = heave
     pair.flown(PUSH)
+    down = np.array([0.0, 0.0, 6.0, 0.0, 0.0, 0.0])
     for i in range(8):
-        pair.run(0.5, tau=PUSH * np.sin(i))
+        pair.run(0.5, tau=PUSH * np.sin(i) + down)
     count = iter(range(10**6))
     pair.up = lambda data: b'' if next(count) % 3 == 0 else data
     pair.run(3.0, tau=PUSH)

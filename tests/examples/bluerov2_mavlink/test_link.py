@@ -48,6 +48,19 @@ def test_odometry_is_the_state_of_the_vehicle_at_its_stamp() -> None:
     assert np.abs(np.diff([s.ns for s in pair.samples]) - 0.02 * SECOND).max() <= 0.006 * SECOND
 
 
+def test_rate_and_patience_are_those_that_were_asked_for() -> None:
+    pair = Pair(MOVING, LinkSettings(rate=20.0, timeout=SECOND // 4))
+    pair.run(2.0)
+    steps = np.diff([sample.ns for sample in pair.samples])
+    assert np.median(steps) == pytest.approx(SECOND // 20, rel=0.15)
+    assert pair.link.voltage == 16.0
+    pair.down = nothing
+    pair.run(0.2)
+    assert pair.link.hears()
+    pair.run(0.2)
+    assert not pair.link.hears()
+
+
 def test_the_vehicle_is_asked_for_what_is_needed_and_nothing_moves_unasked() -> None:
     pair = Pair()
     pair.run(2.0, tau=PUSH)
@@ -142,6 +155,17 @@ def test_a_driver_that_stood_still_wants_to_be_asked_again() -> None:
     assert not pair.autopilot.armed
 
 
+def test_a_driver_that_was_not_asked_may_stand_still() -> None:
+    pair = Pair()
+    pair.run(1.0)
+    link = pair.link
+    pair.link = SimpleNamespace(receive=lambda *_: None, tick=lambda _: None)
+    pair.run(3.5)
+    pair.link = link
+    pair.run(0.1)
+    assert not said(pair, 'stood still')
+
+
 @pytest.mark.parametrize('asked', [False, True])
 def test_a_driver_that_follows_a_killed_one_does_not_keep_its_last_input_alive(asked) -> None:
     pair = Pair().flown(PUSH)
@@ -177,9 +201,10 @@ def test_messages_of_others_are_dropped_and_counted() -> None:
     pair.run(0.004)
     assert pair.link.refused == refused + 1
     offset, other = pair.link.clock.local(0), 3000 * SECOND  # of another station's clock
-    for _ in range(40):
+    for i in range(40):
         boot_time = pair.now - pair.booted
-        pair._downs.send(mavlink.MAVLink_timesync_message(boot_time, pair.now - other))
+        asked = pair.now + (SECOND // 100 if i % 2 else -other)
+        pair._downs.send(mavlink.MAVLink_timesync_message(boot_time, asked))
         pair.run(0.004)
     assert pair.link.clock.local(0) == offset
     pair.run(1.0)

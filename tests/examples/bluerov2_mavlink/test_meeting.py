@@ -139,6 +139,9 @@ def test_an_old_firmware_is_said_and_a_trial_version_is_named() -> None:
     pair = Pair(Booted(version=(3, 5, 4)))
     pair.run(1.0)
     assert told(pair, 'ArduSub 3.5.4 is older than 4.0: nobody has tried it') == 1
+    first = Pair(Booted(version=(4, 0, 0)))
+    first.run(1.0)
+    assert told(first, 'older than 4.0') == 0
     for kind, name in ((0, ' dev'), (64, ' alpha'), (128, ' beta'), (192, ' rc'), (255, '')):
         sent = int.from_bytes((4, 5, 1, kind), 'big')
         pair.link.profile.take_version(SimpleNamespace(flight_sw_version=sent))

@@ -231,11 +231,11 @@ def test_a_wrench_explains_nine_tenths_of_what_it_is_late_for(size, is_told) -> 
 
 
 def test_a_delay_is_the_lowest_point_and_its_error_the_scatter_of_the_parts() -> None:
-    lowest = np.where(np.arange(20) < 10, 0.24, 0.44)  # s
+    lowest = np.where(np.arange(20) < 10, 0.24, 0.444)  # s
     found, least = _least(-1.0, lambda delay: 3.0 * (delay - lowest) ** 2, 6)
     assert found is not None
-    assert (found.value, found.error) == pytest.approx((0.34, 0.1 / np.sqrt(20)))
-    assert least == pytest.approx(20 * 3.0 * 0.01)
+    assert (found.value, found.error) == pytest.approx((0.342, 0.102 / np.sqrt(20)))
+    assert least == pytest.approx(20 * 3.0 * (0.102**2 + 0.002**2))  # of 0.34, which was tried
     for place in (-1.2, 1.2):  # beyond those that are tried
         assert _least(-1.0, lambda delay, p=place: np.full(20, (delay - p) ** 2), 6)[0] is None
 

@@ -46,7 +46,7 @@ help:  ## this list
 
 setup: $(READY)  ## the environment in .venv
 
-# by uv in a sixth of pip's CPU time; it sees neither packages of the system nor an index that pip was told of
+# by uv in two fifths of pip's CPU time; it sees neither packages of the system nor an index that pip was told of
 UV := $(BIN)/python -m uv pip install --quiet --system-certs --python $(BIN)/python
 PIP := $(BIN)/python -m pip install --quiet --no-compile
 install = { test -z "$(VENV_OPTIONS)" && ! $(BIN)/python -m pip config list | grep -q '\.index-url' && $(UV) $(1); } || $(PIP) $(1)

@@ -104,8 +104,8 @@ class OnboardLog:
             raise InputError(self.path, '', 'records of an on-board log of ArduPilot', 'none')
         begin = min((tally.first for tally in found.values() if tally.first), default=0)
         for tally in found.values():  # definitions stand before the first time
-            times = (max(tally.first, begin), tally.last)
-            tally.first, tally.last = ((time + self._epoch) * US for time in times)
+            times = tally.first, tally.last
+            tally.first, tally.last = ((max(time, begin) + self._epoch) * US for time in times)
         notes += self._said_of_damage()
         return found
 

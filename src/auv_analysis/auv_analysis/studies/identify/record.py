@@ -56,8 +56,8 @@ class Record:
 
     def part(self, begin: float, end: float) -> 'Record':
         """The part from one time to another, s; commands keep their grid."""
-        first, last = (round((t - self.start) / self.step) for t in (begin, end))
-        first, last = max(first, 0), min(last, len(self.command))
+        steps = (round((t - self.start) / self.step) for t in (begin, end))
+        first, last = (min(max(step, 0), len(self.command)) for step in steps)
         keep = [(t >= begin) & (t <= end) for t in (self.attitude_t, self.velocity_t)]
         return Record(
             self.name, self.attitude_t[keep[0]], self.attitude[keep[0]],

@@ -9,6 +9,8 @@ import pytest
 from auv_analysis.cli import main
 from auv_analysis.cli.main import COMMANDS, GROUPS
 
+SRC, FILES = Path(__file__).resolve().parents[3] / 'src', ('setup.py', 'package.xml')
+
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -87,3 +89,10 @@ def test_help_lists_every_command_once_below_a_heading(capsys):
     assert [line.rstrip(':') for line in lines if line.endswith(':')] == list(GROUPS)
     assert [line.split()[0] for line in lines if line.startswith('  ')] == list(COMMANDS)
     assert max(map(len, lines)) <= 80
+
+
+def test_version_is_the_one_of_all_packages(capsys):
+    texts = [path.read_text() for name in FILES for path in SRC.glob(f'*/{name}')]
+    (version,) = {re.search(r"version(?:='|>)([\d.]+)", text)[1] for text in texts}
+    main.main(['--version'])
+    assert capsys.readouterr().out == f'auv_gvc {version}\n'

@@ -75,7 +75,8 @@ class Parser(argparse.ArgumentParser):
         for title, entries in self.groups.items():
             lines += ['', f'{title}:']
             lines += [f'  {name:<{NAMES}}{text}' for name, text in entries.items()]
-        return '\n'.join([*lines, '', f'{self.prog} COMMAND --help says more of each.', ''])
+        more = f'{self.prog} COMMAND --help says more of each, {self.prog} --version which this is.'
+        return '\n'.join([*lines, '', more, ''])
 
     def _unknown(self, args: Sequence[str]) -> str:
         """The first option that this parser does not know, or an empty text."""

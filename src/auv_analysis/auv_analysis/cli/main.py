@@ -83,6 +83,7 @@ def parser(line: Sequence[str] | None = None) -> Parser:
     main = Parser(
         prog='auv', description='Experiments with underwater vehicles, and what they say.'
     )
+    main.add_argument('--version', action='store_true', help='which version is installed')
     main.groups = GROUPS
     commands = main.add_subparsers(dest='command', metavar='COMMAND')
     first = line[0] if line else ''
@@ -125,6 +126,10 @@ def _main(arguments: list[str] | None) -> None:
         complete(parser())
     arguments = sys.argv[1:] if arguments is None else arguments
     options = parser(arguments).parse_args(arguments)
+    if options.version:
+        from importlib.metadata import version
+
+        return print(f'auv_gvc {version("auv_analysis")}')
     if options.command is None:
         from auv_analysis.cli.guide import print_guide
 

@@ -156,8 +156,8 @@ def runs() -> Runs:
         return well and reversed_.failed == {'response_sway'} and moved and ended
 
     def stalled(runs: Runs) -> bool:
-        timed = {'gaps', 'age', 'response_delay', 'wrench_subscriber'}  # late, or not met yet
-        return any(timed & runs.ended[name].failed for name in ('healthy', 'reversed'))
+        timed = {'gaps', 'age', 'response_delay', 'wrench_subscriber'}  # late, not met yet, vague
+        return any(timed - runs.ended[name].passed for name in ('healthy', 'reversed'))
 
     return undisturbed(Runs, as_promised, stalled)
 
@@ -166,9 +166,9 @@ def test_a_healthy_vehicle_passes(runs: Runs) -> None:
     ended = runs.ended['healthy']
     assert ended.code == 0, ended.errors
     assert list(ended.checks) == list(CHECKS)
-    passed = ended.passed
-    assert passed > {'response_sway', 'response_delay', 'silence', 'actuation'}
-    assert passed > {'clock', 'age', 'drift', 'twist_frame', 'wrench_publishers', 'qos_recorder'}
+    named = 'response_sway', 'response_delay', 'silence', 'actuation', 'clock', 'age', 'drift'
+    named += 'twist_frame', 'wrench_publishers', 'qos_recorder'
+    assert not [ended.checks[id] for id in named if id not in ended.passed]
     before, begins, after = ended.errors.partition('begins in 3 s')
     assert 'THE VEHICLE WILL MOVE' in before
     assert 'sway ±' in before

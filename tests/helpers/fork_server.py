@@ -154,6 +154,7 @@ class ForkServer:
             cwd=Path(__file__).parents[1],
             stdin=subprocess.DEVNULL,
             pass_fds=[entrance],
+            start_new_session=True,  # what ends all tests at once must not end it: it cleans up
         )
 
     def start(

@@ -99,14 +99,16 @@ from helpers.node_processes import fresh_domain, start_node
 node = start_node('setpoint_node', fresh_domain())
 assert 'begins' in node.stdout.readline()
 print(node.pid, flush=True)
-os.kill(os.getpid(), 9)
+os.killpg(0, 9)
 """
 
 
 def test_a_run_that_is_killed_leaves_none_of_its_programs() -> None:
     environ = {**os.environ, 'PYTHONPATH': str(TESTS), OWNER: ''}
     command = [sys.executable, '-c', KILLED]
-    ended = subprocess.run(command, env=environ, stdout=subprocess.PIPE, text=True, check=False)
+    ended = subprocess.run(
+        command, env=environ, stdout=subprocess.PIPE, text=True, start_new_session=True, check=False
+    )
     assert ended.returncode == -9
     left, limit = int(ended.stdout), time.monotonic() + patience(10)
     while psutil.pid_exists(left):

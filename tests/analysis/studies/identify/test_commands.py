@@ -113,12 +113,13 @@ def test_a_bag_of_its_own_is_held_out(short, bag):
 
 
 @pytest.mark.usefixtures('unrendered')
-def test_intervals_on_request_stand_beside_the_others(bag, tmp_path, approved):
+def test_intervals_on_request_stand_beside_the_others(bag, tmp_path, approved, capsys):
     out = tmp_path / 'asked'
     fewer = ('--part', '0:30', '--fixed', 'M', '--fixed', 'D_quadratic')
     asked = ('--bootstrap', 40, '--profile', 'lag')
     given = ('identify', bag, '--vehicle', 'herman2018', '--out', out)
     main([str(argument) for argument in (*given, *fewer, *asked)])
+    assert '  profile likelihood 1 of 1: lag\n' in capsys.readouterr().err
     rows = parquet.read_table(out / 'coefficients.parquet').to_pylist()
     lag = next(row for row in rows if row['name'] == 'lag')
     assert lag['bootstrap_low'] < lag['value'] < lag['bootstrap_high']

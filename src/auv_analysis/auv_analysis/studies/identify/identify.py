@@ -381,9 +381,11 @@ def _profiles(
 ) -> list[Profile]:
     """Profile likelihoods of those coefficients that are asked for and free."""
     names = [name for name in fit.unknowns.names if name in asked]
-    if names:
-        say(f'profile likelihood of {join(names)}')
-    return [profile(problem, fit, covariance, name) for name in names]
+    found = []
+    for k, name in enumerate(names, start=1):  # ten refits each
+        say(f'profile likelihood {k} of {len(names)}: {name}')
+        found.append(profile(problem, fit, covariance, name))
+    return found
 
 
 def _best_observer(problem: OutputError, u: Unknowns, theta: np.ndarray) -> float:

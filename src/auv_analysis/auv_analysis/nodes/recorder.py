@@ -229,10 +229,10 @@ class GraphClock:
 def make_writer(node: Node, p: RecorderSettings) -> BagWriter:
     """Open the bag, once the settings are checked; InputError when something is wrong."""
     name, known = node.get_name(), [topic.name for topic in topics.STEP_TOPICS]
-    unknown = [topic for topic in p.topics if topic not in known]
-    if unknown:
-        listed = f'step topics: {", ".join(known)}{meant(unknown[0], known)}'
-        raise InputError(name, 'topics', listed, unknown[0])
+    for topic in p.topics:
+        if topic not in known:
+            listed = f'step topics: {", ".join(known)}{meant(topic, known)}'
+            raise InputError(name, 'topics', listed, topic)
     attachments = {}
     for entry in p.attachments:
         label, equals, path = entry.partition('=')

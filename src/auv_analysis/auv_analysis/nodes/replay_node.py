@@ -154,7 +154,8 @@ class Player:
             settings.rate, settings.start_paused, skips_gaps=settings.skip_gaps
         )
         self.published: Counter[str] = Counter()
-        self.loops, self.now_ns, self._clock_ns = 0, plan.begin, -1
+        self.loops, self.now_ns = 0, plan.begin
+        self._clock_ns: int | None = None  # that was published last
         self.ended, self.failure = False, ''
         self._stream = self._rewound()
         self._next: PlayedMessage | None = None
@@ -298,7 +299,7 @@ class Player:
         self.loops += 1
         if self._plan.settings.loop:
             self.playback.restart()
-            self._stream, self._clock_ns = self._rewound(), -1
+            self._stream, self._clock_ns = self._rewound(), None
         else:
             self.ended = True
 

@@ -3,6 +3,7 @@
 Flow control goes by acknowledgement and by the answers to odometry.
 """
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -195,13 +196,12 @@ class CommandGuard:
         """Why commands must not be published at all; `final`: a name does not come any more."""
         if self._foreign:
             return None
-        for topic, publisher in self._publishers.items():
+        for publisher in self._publishers.values():
             found = self._actors(publisher)
             if found and (final or found != [NAMELESS]):
                 key, expected = publisher.topic_name, 'nobody who acts on recorded commands'
                 names = f'{", ".join(found)} (allowed by --force-commands)'
                 return InputError(self._node.get_name(), key, expected, names)
-            self._judged.pop(topic, None)
         return None
 
     def _actors(self, publisher: Any) -> list[str]:
@@ -280,7 +280,7 @@ class Receivers:
         self._taken = dict(self._sent)
         self._clients: dict[str, Client] = {}
         self._round: _Round | None = None
-        self._found = -LOOK
+        self._found = -math.inf
         self.silent: list[str] = []
 
     def find(self) -> None:
@@ -312,7 +312,7 @@ class Receivers:
         if self._round is None:
             enough = 1 if always else WINDOW // 2
             used = (self._sent[name] - taken for name, taken in self._taken.items())
-            if max(used, default=0) < enough:
+            if max(used) < enough:
                 return
             self._round = _Round(dict(self._sent))
         if self._has_arrived(self._round) and self._is_answered(self._round):
@@ -368,7 +368,6 @@ class Answers:
     def __init__(self, graph: NodeInterface, topic: str):
         self._topic = topic
         self._asked: int | None = None
-        self._since = 0.0
         wrench = topics.Topic(topic, topics.WRENCH.type)
         graph.subscribe(wrench, self._take, topics.every_step())
 

@@ -57,7 +57,6 @@ class WatchNode(BulkNode):
         # made once: which messages are laid out how takes some time to find out
         self._callbacks: dict[topics.Topic, Any] = {t: self._callback(t) for t in self._topics}
         self._subscribed: dict[topics.Topic, Subscription] = {}
-        self._now = 0.0
 
     def take(self) -> None:
         """Take what has come, all at the same time."""

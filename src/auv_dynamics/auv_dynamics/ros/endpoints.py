@@ -29,10 +29,10 @@ class Endpoints:
 
     """
 
-    publishers: int = 0
-    subscribers: int = 0
-    foreign: str = ''
-    conflicts: tuple[str, ...] = ()
+    publishers: int
+    subscribers: int
+    foreign: str
+    conflicts: tuple[str, ...]
 
 
 def full_name(endpoint: Any) -> str:

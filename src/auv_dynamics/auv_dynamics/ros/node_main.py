@@ -121,8 +121,7 @@ class BulkMixin:
 
     def drop_data(self, subscription: Subscription) -> None:
         """End a subscription of the data path."""
-        if subscription in self._data_subscriptions:
-            self._data_subscriptions.remove(subscription)
+        self._data_subscriptions.remove(subscription)
         super().destroy_subscription(subscription)  # type: ignore[misc]  # as above
 
     def take_data(self) -> int:
@@ -353,8 +352,7 @@ def _ending(code: int, seconds: float) -> Iterator[None]:
     call = ctypes.cast(libc['_exit'], ctypes.c_void_p).value
     event = _Event(code, 0, IN_A_THREAD, call)
     libc.timer_create(MONOTONIC, ctypes.byref(event), ctypes.byref(timer))
-    whole, rest = divmod(seconds, 1.0)
-    once = (ctypes.c_long * 4)(0, 0, int(whole), int(rest * NANOSECONDS))
+    once = (ctypes.c_long * 4)(0, 0, *divmod(int(seconds * NANOSECONDS), NANOSECONDS))
     libc.timer_settime(timer, 0, once, None)
     try:
         yield

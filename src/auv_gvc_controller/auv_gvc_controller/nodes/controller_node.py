@@ -3,7 +3,6 @@
 import math
 import sys
 import time
-from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import partial
@@ -75,12 +74,10 @@ class ControllerParameters:
 
         def value(name: str, *_: Any, **accepted: Any) -> Any:
             found = changed[name] if name in changed else self._node.get_parameter(name).value
-            if isinstance(found, float) and not math.isfinite(found):
-                raise InputError(self._node.get_name(), name, 'a finite number', found)
             if accepted.get('one_of') and found not in accepted['one_of']:
                 expected = nearest_of(found, accepted['one_of'])
                 raise InputError(self._node.get_name(), name, expected, found)
-            return list(found) if isinstance(found, array) else found
+            return found
 
         return ControllerSettings.read(value, self._node.get_name())
 

@@ -35,7 +35,9 @@ from std_msgs.msg import Header, String
 
 from auv_analysis.bag.chunks import MessageTable
 from auv_analysis.bag.mcap_file import McapFile
+from auv_analysis.bag.output import LEAST_SIZE, Storage
 from auv_analysis.bag.reading import read_bag
+from auv_analysis.graph.node_settings import RecorderSettings
 from auv_analysis.nodes import recorder, recorder_node
 from auv_analysis.nodes.recorder_node import (
     LostStepError,
@@ -43,6 +45,7 @@ from auv_analysis.nodes.recorder_node import (
     RecorderNode,
     StepLedger,
 )
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.interface import DEPTH, NANOSECONDS, Frames, nanoseconds
 from auv_dynamics.ros.rclpy_internals import has_data_path, raw_class
@@ -167,6 +170,7 @@ def test_a_signal_closes_the_bag(tmp_path: Path, how: int) -> None:
         code, output = stop(processes['recorder_node'], how)
     assert code == 0
     assert 'did not arrive' not in output
+    assert re.search(rf'code 0: recorded \d+ messages into {tmp_path}/bag\n', output)
     contents = read_bag(tmp_path / 'bag')
     assert contents.notes == []
     assert contents.counts['/odom'] == 10
@@ -230,17 +234,19 @@ def test_the_ledger_says_which_step_is_due_when_and_who_is_behind() -> None:
 
 def test_without_a_grid_gaps_are_counted_by_the_time_since_the_message_before() -> None:
     ledger = StepLedger(['odom'], 10, strict=False)
-    for ns in (3, 14, 41, 33, 50, 63):  # 33 came late
+    complete = []
+    for ns in (3, 14, 41, 30, 50, 63):  # 30 came late
         ledger.add('odom', ns)
+        complete.append(ledger.complete)
     assert ledger.gaps == {'odom': 2}
-    assert ledger.complete == 6
+    assert complete == [0, 1, 3, 3, 4, 6]
 
 
 def test_publications_are_followed_by_their_numbers() -> None:
     counted = PublicationLedger(strict=False)
-    for number in (7, 8, None, 11, 12):
+    for number in (7, 8, None, 11, 12, 15, 3, 7):  # it has begun anew before 3
         counted.add('clock', number)
-    assert counted.gaps == {'clock': 2}
+    assert counted.gaps == {'clock': 2 + 2 + 3}
     strict = PublicationLedger()
     strict.add('clock', 7)
     with pytest.raises(LostStepError, match='clock: expected publication 8, found 9: lost'):
@@ -476,18 +482,21 @@ def test_who_keeps_nothing_for_late_comers_is_heard_beside_who_does() -> None:
 
 def test_what_has_arrived_is_taken_before_a_subscription_is_made_anew() -> None:
     """As a publisher that asks for less has come, which the old one would not hear."""
-    called: list[str] = []
+    called: dict[str, tuple] = {}
 
     class Recorded:
         def __getattr__(self, name: str) -> Any:
-            return lambda *_, **__: called.append(name)
+            return lambda *given, **_: called.update({name: given})
 
     others = recorder.OtherTopics(Recorded(), recorder.Wanted('/', ('/x',)), print)
     others._kinds['/x'] = 'std_msgs/msg/String'
     others._heard['/x'] = SimpleNamespace(qos_profile=QoSProfile(depth=1))
-    weak = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    offered = {'durability': DurabilityPolicy.TRANSIENT_LOCAL}  # more than was asked for
+    weak = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT, **offered)
     others._adapt('/x', [SimpleNamespace(qos_profile=weak)])
-    assert called == ['take_data', 'drop_data', 'create_subscription', 'add_data']
+    assert [*called] == ['take_data', 'drop_data', 'create_subscription', 'add_data']
+    qos = called['create_subscription'][3]
+    assert (qos.reliability, qos.durability) == (weak.reliability, DurabilityPolicy.VOLATILE)
 
 
 def test_a_bag_says_how_its_topics_were_remapped(tmp_path: Path, timers) -> None:
@@ -500,6 +509,48 @@ def test_a_bag_says_how_its_topics_were_remapped(tmp_path: Path, timers) -> None
     contents = read_bag(tmp_path / 'bag')
     assert contents.names == {'/thrust': '/auv1/wrench'}
     assert contents.counts['/thrust'] == contents.counts['/auv1/odom'] == 1
+
+
+RENAMED: Any = SimpleNamespace(
+    get_name=lambda: 'recorder_node', get_namespace=lambda: '/auv1',
+    resolve_topic_name=lambda name: name if name.startswith('/') else f'/auv1/{name}',
+)  # fmt: skip
+
+
+def test_the_storage_is_that_of_the_parameters(tmp_path: Path, monkeypatch) -> None:
+    """The pace of the files is that of the first of the topics."""
+    monkeypatch.setattr(recorder, 'BagWriter', lambda *given: given)
+    disks = {tmp_path: SimpleNamespace(free=77)}
+    monkeypatch.setattr('shutil.disk_usage', disks.get)
+
+    def made(**changed: Any) -> tuple[Path, dict[str, str], Storage]:
+        values = {'topics': ('wrench', 'odom'), 'max_size': 1 << 21, 'max_duration': 2.5}
+        values |= {'bag': str(tmp_path / 'a' / 'bag'), 'compression': 'lz4', 'chunk_size': 2000}
+        settings = RecorderSettings(**values | {'free_space': 77} | changed)
+        return recorder.make_writer(RENAMED, settings)
+
+    bag, attachments, storage = made()
+    assert bag == tmp_path / 'a' / 'bag'
+    assert storage == Storage('lz4', 2000, 1 << 21, 2_500_000_000, '/auv1/wrench', 77)
+    assert made(topics=())[2].pace == ''
+    least = LEAST_SIZE + len(attachments['recording.yaml'])
+    for name, value, smaller in (('max_size', least, least - 1), ('max_duration', 1.0, 0.999)):
+        assert made(**{name: value})
+        with pytest.raises(InputError, match=f'storage.{name}'):
+            made(**{name: smaller})
+    with pytest.raises(InputError, match=r'storage\.free_space.*77 bytes free'):
+        made(free_space=78)
+    with pytest.raises(InputError) as caught:
+        made(topics=('wrnch', 'warp'))
+    assert caught.value.expected.endswith(' (nearest: wrench)')
+
+
+def test_other_topics_are_named_as_the_node_names_them() -> None:
+    settings = RecorderSettings(extra_topics=('all', 'ping', '/auv2/ping'), exclude='secret')
+    taken = 'all', '/auv1/ping', '/auv2/ping'
+    assert recorder.make_wanted(RENAMED, settings) == recorder.Wanted(
+        '/auv1', taken, re.compile('secret')
+    )
 
 
 def test_refuses_a_folder_that_holds_a_bag(tmp_path: Path) -> None:
@@ -562,6 +613,7 @@ def test_a_driver_with_best_effort_is_heard_where_that_is_asked_for(tmp_path: Pa
 
 
 Do = Callable[[], None]
+DAY = 86_400 * NANOSECONDS
 
 
 @pytest.fixture
@@ -637,8 +689,11 @@ def test_in_real_time_it_has_the_time_when_it_came(tmp_path: Path, timers) -> No
         give_error(node, now, **came)
         give(node, 'odom', convert.odometry(0, UPRIGHT, FRAMES), **came)  # without a stamp
         give_clock(node, 0)
+        for ns in (now + DAY, now + DAY + 1):  # the latter is of another clock
+            give(node, 'twist', convert.twist(ns, (0.0,) * 6, FRAMES), **came)
         made.drop(node)
     found = times(bag)
+    assert found['/twist'] == [(now + 7, now + 3), (now + DAY, now + DAY)]
     assert found['/analysis/lumped_error'] == [(now + 7, now + 3)]
     assert found['/odom'] == [(now, now), (now + 7, now + 3)]
     assert found['/clock'] == [(0, 0)]
@@ -654,11 +709,60 @@ def test_in_real_time_what_comes_without_a_step_has_the_time_when_it_came(
     assert times(tmp_path / 'bag')['/diagnostics'] == [(7, 3)]
 
 
-@pytest.mark.parametrize('limit', ['EARLY_COUNT', 'EARLY_SIZE', 'EARLY_TIME'])
-def test_what_waits_for_too_long_is_written_between_the_steps(
-    tmp_path: Path, timers, monkeypatch: pytest.MonkeyPatch, limit: str
+def clock_of(now: int, *, strict: bool, simulated: bool = False) -> recorder.GraphClock:
+    """The time of a graph whose node's clock shows this, in ns."""
+    shown = SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=now))
+    told = SimpleNamespace(value=simulated)
+    node: Any = SimpleNamespace(get_parameter=lambda _: told, get_clock=lambda: shown)
+    return recorder.GraphClock(node, strict)
+
+
+@pytest.mark.parametrize(
+    ('messages', 'seconds'),
+    [([b''] * 10_001, 0.0), ([bytes(1 << 24), b'x'], 0.0), ([b'', b''], 60.1)],
+    ids=['count', 'size', 'time'],
+)
+def test_what_comes_before_the_first_step_waits_within_bounds(
+    monkeypatch: pytest.MonkeyPatch, messages: list[bytes], seconds: float
 ) -> None:
-    monkeypatch.setattr(recorder, limit, -1)
+    clock, now = clock_of(0, strict=True), 100.0
+    monkeypatch.setattr('time.monotonic', lambda: now)
+    for later in (0.0, min(seconds, 60.0)):
+        now = 100.0 + later
+        for message in messages[:-1]:
+            clock.hold(('/x', 'kind', message, {}))
+        assert len(clock.released()) == len(messages) - 1
+        assert clock.latest == -1, 'they have to wait on'
+    now = 100.0 + seconds
+    for message in messages:
+        clock.hold(('/x', 'kind', message, {}))
+    assert len(clock.released()) == len(messages)
+    assert (clock.latest, clock.early) == (0, [])
+
+
+def test_the_time_of_a_graph_is_moved_to_the_epoch_of_its_steps_where_that_is_another_one() -> None:
+    for stamp, received, expected in (
+        (7 + DAY, 5, 5), (8 + DAY, 5, 6 + DAY), (8 + DAY, None, 8 + DAY), (9, None, 7),
+    ):  # fmt: skip
+        clock = clock_of(7, strict=False)
+        assert clock.now(received) is None
+        clock.follow(stamp)
+        clock.follow(0)  # the first one tells
+        assert clock.now(received) == expected
+    late = clock_of(8 + DAY, strict=False)
+    late.follow(0)
+    assert late.now(5) == 0, 'before the beginning of that epoch'
+    simulated = clock_of(0, strict=False, simulated=True)
+    assert simulated.now(5) is None
+    simulated.follow(3)
+    assert simulated.now(5) == 3
+    assert clock_of(7, strict=False, simulated=True).now(5) == 7
+
+
+def test_what_waits_for_too_long_is_written_between_the_steps(
+    tmp_path: Path, timers, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder, 'EARLY_COUNT', -1)
     with program() as made:
         node = recorder_in(made, tmp_path / 'bag')
         give(node, '/diagnostics', DiagnosticArray(), source_timestamp=3)
@@ -684,7 +788,8 @@ def test_a_topic_is_described_as_it_was_offered_when_its_first_message_came(
     entries = told['rosbag2_bagfile_information']['topics_with_message_count']
     found = {one['topic_metadata']['name']: one['topic_metadata'] for one in entries}
     assert found['/remark']['offered_qos_profiles'][0]['reliability'] == 'best_effort'
-    assert found['/odom']['type_description_hash'], 'known without any publisher'
+    digest = found['/odom']['type_description_hash']
+    assert digest.startswith('RIHS01_'), 'known without any publisher'
 
 
 def test_a_loss_on_a_topic_of_the_analysis_stays_an_error_at_the_end(
@@ -741,6 +846,7 @@ def test_progress_is_said_once_and_repeated_now_and_then(tmp_path: Path, timers)
             if k is not None:
                 give_steps(node, k)
             do()
+            assert node.graph.latest_ns == 0
             made.spin(0.1)
             said.append([nanoseconds(one.stamp) for one in made.heard['recorder/progress']])
     assert said == [[], [], [0], [0], [0, 0]]
@@ -778,12 +884,20 @@ def test_steps_and_messages_that_did_not_arrive_are_said_at_the_end(
         give_steps(node, 0, 1, 4)
         for number in (4, 6):
             give_error(node, 0, publication_sequence_number=number)
+            seen = {'publication_sequence_number': 2 * number}
+            give(node, 'twist', convert.twist(0, (0.0,) * 6, FRAMES), **seen)
+            give(node, '/diagnostics', DiagnosticArray(), **seen)  # of several that count
         made.drop(node)
     said = capfd.readouterr().err
-    assert "'odom': 2, 'wrench': 2, 'analysis/lumped_error': 1}" in said
+    assert "'odom': 2, 'wrench': 2, 'analysis/lumped_error': 1, 'twist': 3}" in said
 
 
-DAY = 86_400 * NANOSECONDS
+def test_in_lock_step_a_set_point_that_is_lost_is_an_error(tmp_path: Path, timers) -> None:
+    with program() as made:
+        node = recorder_in(made, tmp_path / 'bag', topics=['odom', 'cmd_vel'])
+        for k, code in ((0, None), (1, None), (3, 1)):
+            give(node, 'cmd_vel', convert.twist(k * STEP, (0.0,) * 6, FRAMES))
+            assert node.exit_code == code
 
 
 def test_where_the_clock_is_set_no_time_has_passed() -> None:
@@ -798,8 +912,9 @@ def test_where_the_clock_is_set_no_time_has_passed() -> None:
         ledger.add('wrench', ns)
     assert (ledger.complete, ledger.furthest) == (5, 5), 'nor with the stray'
     assert ledger.gaps == {'odom': 1, 'wrench': 1}
-    ledger.add('odom', 3 * DAY)
-    assert ledger.furthest == DAY // 10, 'that of a day has'
+    ledger.add('odom', 3 * DAY + 50)
+    assert ledger.furthest == DAY // 10 + 5, 'that of a day has'
+    assert ledger.gaps['odom'] == DAY // 10
 
 
 def test_in_real_time_a_message_without_a_stamp_begins_no_run(tmp_path: Path, timers) -> None:

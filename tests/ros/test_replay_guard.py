@@ -7,10 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 from geometry_msgs.msg import Twist, Wrench
-from helpers.made_messages import Bag, geometry, serialized, stamped
+from helpers.made_messages import ODOMETRY, Bag, geometry, odometry, serialized, stamped
 from helpers.node_processes import assert_one_line, graph, parameters, run_node, stop
 from helpers.nodes_in_process import program
-from helpers.played_bags import STEP, ended, made, playing, process, steps_of, there
+from helpers.played_bags import STATE, STEP, ended, made, playing, process, steps_of, there
 from rclpy.qos import DurabilityPolicy
 from std_srvs.srv import Trigger
 
@@ -163,9 +163,15 @@ def test_a_clock_of_a_node_without_a_name_is_another_one_unless_the_name_comes(
     tmp_path: Path, monkeypatch
 ) -> None:
     unnamed = SimpleNamespace(node_name=UNNAMED, node_namespace='/')
-    monkeypatch.setattr(replay_node, 'other_publishers', lambda node, topic: [unnamed])
-    monkeypatch.setattr(replay_node, 'NAMED', math.inf)
+    others = [unnamed]
+    monkeypatch.setattr(replay_node, 'other_publishers', lambda node, topic: others)
     with playing(made(tmp_path / 'bag'), start_paused=True) as (peer, replay):
+        assert replay._rival(3.0) is None
+        others.clear()
+        assert replay._rival(3.5) is None
+        others.append(unnamed)  # another one
+        assert [replay._rival(now) is None for now in (5.0, 5.9, 6.0)] == [True, True, False]
+        monkeypatch.setattr(replay_node, 'NAMED', math.inf)
         peer.until(lambda: replay.playing or replay.exit_code is not None, 'the replay')
         assert replay.exit_code is None
         monkeypatch.setattr(replay_node, 'NAMED', 0.0)
@@ -213,7 +219,7 @@ def test_a_listener_without_a_name_gets_no_command_before_it_has_one(monkeypatch
     guard.look(5.0)
     assert guard.may('/wrench', 5.9) is None
     assert not complaints
-    assert guard.may('/wrench', 6.1) is False
+    assert guard.may('/wrench', 6.0) is False
     assert complaints == [f'commands are not published any more: {NAMELESS} on /wrench']
 
 
@@ -240,13 +246,17 @@ def test_what_has_no_header_is_checked_and_let_go_as_well(tmp_path: Path, capfd)
         for topic, kind in (('/wrench', 'Wrench'), ('/cmd_vel', 'Twist')):
             data = serialized(geometry(kind, *halves))
             bag.add(topic, f'geometry_msgs/msg/{kind}', k * STEP, data)
-    plain = Topic('wrench', Wrench), Topic('cmd_vel', Twist)
+    bag.add('/setpoint', ODOMETRY, 0, serialized(odometry(0, STATE)))  # with frames of its own
+    schema = bag._writer.register_schema('sonar_msgs/msg/Ping', 'ros2msg', b'uint8 x')
+    bag._writer.register_channel('/thrusters', 'cdr', schema)  # which cannot be published
+    plain = Topic('wrench', Wrench), Topic('cmd_vel', Twist), Topic('setpoint', topics.ODOM.type)
     with playing(bag.close(), **FORCED) as (peer, replay):
         peer.listen(*plain)
         assert ended(peer, replay) == 0
         replay.close()
         peer.until(lambda: len(peer.heard['wrench']) == 3, 'two wrenches and a zero')
         peer.until(lambda: len(peer.heard['cmd_vel']) == 2, 'two velocities')
+        peer.until(lambda: peer.heard['setpoint'], 'a set-point')
     assert [message.force.x for message in peer.heard['wrench']] == [1.0, 3.0, 0.0]
     assert [message.linear.x for message in peer.heard['cmd_vel']] == [1.0, 3.0]
     error = capfd.readouterr().err

@@ -3,6 +3,7 @@
 import signal
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from helpers.made_messages import STRING, Bag, new, odometry, serialized
@@ -36,9 +37,10 @@ from std_srvs.srv import SetBool, Trigger
 
 from auv_analysis.bag.reading import read_bag
 from auv_analysis.bag.step_topics import ODOMETRY
-from auv_analysis.nodes import replay_publishers
+from auv_analysis.nodes import replay_node, replay_publishers
 from auv_analysis.nodes.replay_node import ReplayNode
-from auv_analysis.nodes.replay_publishers import LATE, WINDOW, offered_again
+from auv_analysis.nodes.replay_publishers import offered_again
+from auv_analysis.replay.played_bag import PlayedMessage
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.interface import DEPTH, nanoseconds
@@ -185,6 +187,7 @@ def test_its_diagnostics_say_where_it_is_and_what_it_waits_for(tmp_path: Path) -
         assert [told(name) for name in names] == ['0.11', '2.0', 'True', '0', '']
         said = peer.heard[topics.DIAGNOSTICS.name][-1]
         assert nanoseconds(said.header.stamp) == 11 * STEP
+        assert not replay.lockstep
 
 
 EPOCH = 1_700_000_000 * 10**9  # a bag that was stamped by a wall clock
@@ -232,6 +235,21 @@ def test_plays_a_part_again_and_again(tmp_path: Path) -> None:
     assert clocks(peer)[-6:] in [once[k:] + once[:k] for k in range(6)]
 
 
+def test_a_loop_that_is_stepped_through_is_held_at_its_beginning(tmp_path: Path) -> None:
+    with playing(made(tmp_path / 'bag', 1), loop=True, start_paused=True) as (peer, replay):
+        peer.listen(topics.CLOCK)
+        peer.until(lambda: replay.playing, 'the replay')
+        peer.listen(ODOM)  # who has come since is asked as well
+        peer.node.create_service(Trigger, '~/ready', lambda _, response: response)
+        peer.until(lambda: asks(replay), 'the peer')
+        for k in (1, 2):
+            assert replay.player.step() == 0
+            peer.until(lambda k=k: replay.player.loops == k, 'the end of the bag')
+            peer.spin(0.1)
+            assert replay.player.published.total() == 4 * k
+            peer.until(lambda k=k: clocks(peer) == [0] * k, 'the clock')
+
+
 def test_a_controller_follows_into_the_next_loop(tmp_path: Path) -> None:
     """It refuses the jump back in time at first, says so, and starts anew."""
     other = topics.Topic('replay/other', topics.WRENCH.type)
@@ -260,6 +278,8 @@ def test_waits_for_answers_in_lock_step(tmp_path: Path) -> None:
         for k in range(50):
             peer.until(lambda k=k: len(peer.heard[ODOM.name]) == k + 1, f'odometry {k}')
             if k in (0, 30, 49):
+                for old in peer.heard[ODOM.name][:k][-1:]:  # what answers another one is no answer
+                    peer.publish(other, topics.WRENCH.type(header=old.header))
                 peer.spin(0.2)
                 assert len(peer.heard[ODOM.name]) == k + 1
                 assert replay.exit_code is None
@@ -284,7 +304,7 @@ def test_asks_by_the_odometry_and_not_by_the_truth(tmp_path: Path) -> None:
 
 
 def test_names_the_answer_that_does_not_come(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr('auv_analysis.nodes.replay_publishers.PATIENCE', 0.0)
+    monkeypatch.setattr('auv_analysis.nodes.replay_publishers.PATIENCE', 0.2)
     values = {'rate': 0.0, 'answers': 'other/wrench', 'start_paused': True}
     with playing(made(tmp_path / 'bag'), **values) as (peer, replay):
         peer.until(lambda: replay.playing, 'the replay')
@@ -294,7 +314,8 @@ def test_names_the_answer_that_does_not_come(tmp_path: Path, monkeypatch) -> Non
         assert replay.exit_code is None, 'nobody has to answer in a pause'
         replay.player.run()
         assert ended(peer, replay) == 1
-        assert replay.failure.startswith('no answer on other/wrench to the odometry of 0 s')
+        failure = 'no answer on other/wrench to the odometry of 0 s for 0.2 s'
+        assert replay.failure == failure
 
 
 def test_waits_for_a_subscriber_that_is_stopped(tmp_path: Path) -> None:
@@ -311,9 +332,9 @@ def test_waits_for_a_subscriber_that_is_stopped(tmp_path: Path) -> None:
             peer.until(lambda: replay.playing and asks(replay), 'the recorder')
             recorder.send_signal(signal.SIGSTOP)
             replay.player.run()
-            peer.until(lambda: replay.player.published['/odom'] == WINDOW, 'a window')
+            peer.until(lambda: replay.player.published['/odom'] == 1000, 'a window')
             peer.spin(0.5)
-            assert replay.player.published['/odom'] == WINDOW
+            assert replay.player.published['/odom'] == 1000
             recorder.send_signal(signal.SIGCONT)
             assert ended(peer, replay) == 0
             assert not replay.player.silent
@@ -337,6 +358,64 @@ def test_a_subscriber_has_taken_all_with_its_second_answer() -> None:
     made._clients, made.silent = {'/x': one}, []
     # asks, takes the answer, asks, takes the answer
     assert [made._is_answered(asked) for _ in range(5)] == [False, False, False, False, True]
+
+
+@pytest.mark.parametrize(
+    ('always', 'used', 'asked'), [(True, 0, 0), (True, 1, 1), (False, 499, 0), (False, 500, 500)]
+)
+def test_it_is_asked_what_has_arrived_when_half_of_the_room_is_used_or_nothing_is_left(
+    always: bool, used: int, asked: int
+) -> None:
+    publishers: Any = {name: SimpleNamespace(wait_for_all_acked=lambda _: True) for name in 'xy'}
+    made = replay_publishers.Receivers(None, publishers)
+    for _ in range(used):
+        made.sent('y')
+    assert made.have_room('y')
+    made.ask(always=always)
+    assert made._taken == {'x': 0, 'y': asked}
+    assert made.have_all() == (used == asked)
+
+
+def test_who_does_not_say_that_data_has_arrived_is_given_up_after_ten_seconds(monkeypatch) -> None:
+    now, arrived, waits = 100.0, {'x': True, 'y': False}, []
+    monkeypatch.setattr('time.monotonic', lambda: now)
+
+    def publisher(name: str) -> Any:
+        return SimpleNamespace(wait_for_all_acked=lambda t: waits.append(t) or arrived[name])
+
+    logger = SimpleNamespace(error=lambda _: None)
+    node: Any = SimpleNamespace(get_logger=lambda: logger)
+    made = replay_publishers.Receivers(node, {name: publisher(name) for name in arrived})
+    made._clients = {'/z': SimpleNamespace(service_is_ready=lambda: True, call_async=waits.append)}
+    asked = replay_publishers._Round({}, began=now)
+    now = 110.0
+    assert not made._has_arrived(asked)
+    assert made._is_answered(asked) is False
+    assert made.silent == []
+    now = 110.1
+    assert made._has_arrived(asked)
+    assert made._is_answered(asked)
+    assert made.silent == ['a subscriber of y', '/z']
+    arrived['x'] = False
+    assert made._has_arrived(asked), 'once is enough'
+    assert not any(getattr(one, 'nanoseconds', 0) for one in waits), 'nothing is waited for'
+
+
+def test_what_is_not_due_is_not_played_and_others_have_a_turn_between(monkeypatch) -> None:
+    now, wait, out = 7.0, 0.5, []
+    player = object.__new__(replay_node.Player)
+    player._receivers = SimpleNamespace(ask=lambda **_: None)
+    player.playback = SimpleNamespace(paused=False, wait=lambda *_: wait, played=lambda _: None)
+    player._stream, player._next = (PlayedMessage(k, '/x', b'') for k in range(9)), None
+    player._goes_out = lambda message, _: out.append(message.ns) or True
+    monkeypatch.setattr('time.monotonic', lambda: now)
+    assert player.advance(now) == 0.01
+    wait = 0.004
+    assert player.advance(now) == 0.004
+    assert out == []
+    wait, now = 0.0, 7.02
+    assert player.advance(7.0) == 0.0
+    assert out == [0]
 
 
 def test_gives_up_a_subscriber_that_stays_silent(tmp_path: Path, monkeypatch) -> None:
@@ -368,12 +447,14 @@ def test_leaves_out_what_is_not_installed(tmp_path: Path) -> None:
         schema = bag._writer.register_schema(kind, 'ros2msg', b'uint8 x')
         channel = bag._writer.register_channel(topic, 'cdr', schema)
         bag._writer.add_message(channel, 0, b'\0\1\0\0\1', 0)
+    bag._writer.register_channel('/untyped', 'cdr', 0)
     bag.close()
     with playing(tmp_path / 'bag', rate=0.0) as (peer, replay):
         assert replay.remarks() == [
             'left out: /two words: not a name of a ROS topic',
             'left out: /evil: its type antigravity/msg/Ping is not installed',
             'left out: /sonar: its type sonar_msgs/msg/Ping is not installed',
+            'left out: /untyped: its type (none) is not installed',
         ]
         peer.listen(ODOM)
         assert ended(peer, replay) == 0
@@ -410,8 +491,12 @@ def test_a_bag_that_was_cut_is_played_up_to_there(tmp_path: Path) -> None:
     [
         ('[{durability: transient_local, depth: 5}]', 5),
         ('[{durability: 1, depth: 5}, {durability: transient_local, depth: 7}]', 7),
-        ('[{durability: 1, depth: 0}, {durability: volatile, depth: 200}]', LATE),
-        (f'[{{durability: 1, depth: {DEPTH + 1}}}]', LATE),
+        ('[{durability: 1, depth: 0}, {durability: volatile, depth: 200}]', 100),
+        ('[{durability: 1, depth: 1}]', 1),
+        (f'[{{durability: 1, depth: {DEPTH}}}]', DEPTH),
+        (f'[{{durability: 1, depth: {DEPTH + 1}}}]', 100),
+        ('[{durability: 1, depth: 5}]'.ljust(9_999), 5),
+        ('[{durability: 1, depth: 5}]'.ljust(10_000), None),
         ('[{durability: volatile, depth: 5}, {durability: 2, depth: 5}]', None),
         *(('', None), ('{', None), ('3', None), ('[3]', None)),
     ],

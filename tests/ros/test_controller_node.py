@@ -26,7 +26,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import GetState
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from auv_dynamics.files.errors import ENDING
 from auv_dynamics.ros import convert, interface, topics
@@ -171,6 +171,14 @@ def test_an_incompatible_publisher_is_heard(lockstep) -> None:
     assert 'reliability' in said[-1].status[0].message
     peer.node.destroy_publisher(made)
     peer.until(lambda: 'incompatible' not in said[-1].status[0].message, 'the end of it')
+    kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    made = peer.node.create_subscription(topics.WRENCH.type, 'wrench', print, kept)
+    conflict = 'wrench: incompatible QoS with another endpoint: durability'
+    peer.until(lambda: conflict in said[-1].status[0].message, 'who does not hear it')
+    said.clear()
+    peer.until(lambda: len(said) > 2, 'more of it')
+    assert all(m.status[0].message == conflict for m in said[1:]), 'although another one does'
+    peer.node.destroy_subscription(made)
     _, output = stop(process)
     assert 'odom: incompatible QoS' in output
 
@@ -232,7 +240,8 @@ def test_mistakes_with_set_points_are_explained() -> None:
     with graph(('controller_node', [*CONTROLLER, *long])) as (peer, processes):
         peer.listen(topics.DIAGNOSTICS)
         explained(peer, WARN, 'nobody publishes /cmd_vel')
-        named = 'expected geometry_msgs/msg/TwistStamped, found geometry_msgs/msg/Twist of /test_'
+        named = 'expected geometry_msgs/msg/TwistStamped, found geometry_msgs/msg/Twist of '
+        named += '/test_peer; publish it with a header'
         explained(peer, WARN, named, (plain, lambda _: Twist()))
         code, output = stop(processes['controller_node'])
     assert code == 0
@@ -255,8 +264,10 @@ def test_a_set_point_that_waits_for_its_acceleration_is_explained() -> None:
         peer.add(ControllerNode, {**GIVEN, 'setpoint_acceleration': 'topic'})
         peer.listen(topics.DIAGNOSTICS)
         moving = topics.CMD_VEL, lambda ns: convert.twist(ns, (0.1, 0, 0, 0, 0, 0), FRAMES)
-        said = 'nobody publishes /cmd_accel; setpoint_acceleration: topic waits for it'
-        explained(peer, WARN, said, moving)
+        waits = 'setpoint_acceleration: topic waits for it'
+        explained(peer, WARN, f'nobody publishes /cmd_accel; {waits}', moving)
+        foreign = topics.CMD_ACCEL, lambda ns: convert.accel(ns, (0.0,) * 6, Frames(base='x'))
+        explained(peer, ERROR, f'no cmd_accel of its stamp comes; {waits}', moving, foreign)
 
 
 def state(peer) -> str:

@@ -124,16 +124,20 @@ def change(node: ControllerNode, **values: Any) -> None:
     assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
 
 
-def test_a_set_point_of_before_is_not_followed_after_an_activation(made, vehicle) -> None:
+def test_a_set_point_of_before_is_not_followed_after_an_activation(made, vehicle, capfd) -> None:
+    """One that lies ahead is: in lock-step it was published once, for a step that comes."""
     held = {'setpoint_pairing': 'latest', 'setpoint_acceleration': 'none'}
     node, answered = controller(made, vehicle, 'gvc', **held), []
-    made.publish(topics.CMD_VEL, by_hand.six(topics.CMD_VEL.type, 0, NU_D[0]))
-    for k in range(2):
+    for k in (0, 2):
+        made.publish(topics.CMD_VEL, by_hand.six(topics.CMD_VEL.type, k * STEP, NU_D[0]))
+    for k in range(3):
         made.publish(topics.ODOM, by_hand.odometry(k * STEP, [*ETA[0, :3], 1, 0, 0, 0, *NU[0]]))
         made.until(lambda k=k: len(made.heard['wrench']) > k, f'wrench {k}')
         answered.append(any(by_hand.six_of(made.heard['wrench'][-1])))
         change(node)
-    assert answered == [True, False]
+    assert answered == [True, False, True]
+    said = re.findall(r'\[ERROR\].*no set-point', capfd.readouterr().err)
+    assert len(said) == 1, 'in lock-step nothing is late: it is an error'
 
 
 @pytest.mark.parametrize('law', LAWS)
@@ -214,7 +218,9 @@ def test_before_it_is_configured_it_hears_and_resets_nothing(made, vehicle) -> N
     assert made.call(Trigger, 'controller_node/reset').success
     made.spin(0.2)
     assert not made.heard['wrench']
-    assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
+    for law, configured in (('pid', 'FAILURE'), ('gvc', 'SUCCESS')):  # it has the gains of this one
+        assert node.set_parameters([Parameter('law', value=law)])[0].successful
+        assert node.trigger_configure() == getattr(TransitionCallbackReturn, configured)
 
 
 def test_what_is_missing_at_an_activation_is_told_and_leaves_it_inactive(made, vehicle) -> None:
@@ -261,7 +267,16 @@ def test_a_change_to_what_no_law_can_use_is_refused(made, vehicle, name, value, 
 
 def test_what_is_not_of_the_controller_may_change_while_it_is_active(made, vehicle) -> None:
     node = controller(made, vehicle, 'gvc')
-    assert node.set_parameters([Parameter('use_sim_time', value=False)])[0].successful
+    other = Parameter('use_sim_time', value=False)
+    assert node.set_parameters([other])[0].successful
+    beside = node.set_parameters_atomically([other, Parameter('gains.k_D', value=[5.0])])
+    assert beside.reason == 'gains.k_D: expected an inactive controller, found an active one'
+
+
+def test_the_law_that_was_named_at_the_start_may_be_named_again(made) -> None:
+    node = made.add(ControllerNode, {'law': 'nowhere:Law', 'autostart': False})
+    (result,) = node.set_parameters([Parameter('law', value='nowhere:Law')])
+    assert 'No module named' in result.reason, 'it is looked for'
 
 
 STILL = {  # without integrals and filter: the wrench of a state stays what it is

@@ -152,7 +152,7 @@ def test_the_first_unknown_parameter_is_told_with_all_that_are_known_but_those_o
 
 def test_what_every_node_of_rclpy_takes_is_taken() -> None:
     given = {'use_sim_time': True, 'start_type_description_service': False}
-    given['qos_overrides./odom.publisher.depth'] = 7
+    given['qos_overrides./odom.publisher.depth'] = 1
     with program() as made:
         node = made.add(FrameConverterNode, given)
         assert {name: node.get_parameter(name).value for name in given} == given
@@ -198,7 +198,7 @@ def test_a_range_may_have_an_upper_end_alone() -> None:
         (ControllerNode, {'limits.wrench': [1.0, float('nan')]}, 'finite numbers'),
         (ControllerNode, {'setpoint_pairing': 'last'}, 'one of exact, latest'),
         (ControllerNode, {'rampe': 1.0}, '(nearest: ramp)'),
-        (ControllerNode, {'expected_subscribers': ['wrnch=1']}, '(nearest: wrench)'),
+        (ControllerNode, {'expected_subscribers': ['wrnch=1']}, 'lumped_error (nearest: wrench)'),
         (ControllerNode, {'expected_subscribers': ['wrench=x']}, 'topic=count'),
     ],
 )

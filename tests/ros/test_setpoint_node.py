@@ -12,6 +12,7 @@ from rcl_interfaces.srv import GetParameters
 
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
+from auv_gvc_controller.nodes import setpoint_node
 from auv_gvc_controller.nodes.setpoint_node import SetpointNode
 
 STEP = 10_000_000
@@ -170,8 +171,9 @@ def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expect
     assert_one_line(run_node('setpoint_node', *arguments), key, expected)
 
 
-def test_goes_on_when_the_driver_starts_again_with_its_clock_at_zero() -> None:
+def test_goes_on_when_the_driver_starts_again_with_its_clock_at_zero(monkeypatch) -> None:
     """What it says next belongs to the time of the vehicle that it was at."""
+    monkeypatch.setattr(setpoint_node, 'BLOCK', 4)  # it had gone on to the next one
     with started(SURGE) as peer:
         peer.listen(topics.CMD_VEL, topics.DIAGNOSTICS)
         old = 100 * 10**9

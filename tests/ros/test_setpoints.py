@@ -121,6 +121,7 @@ def test_what_odometry_asks_for_comes_once_its_subscribers_are_there(lockstep: b
         made.until(lambda: said[-1].status[0].message == 'ok', 'odometry')
         assert said[-1].status[0].level == b'\x00', 'OK'
         assert by_hand.ns_of(said[-1]) == 0, 'nothing before there is a subscriber'
+        assert said[-1].header.frame_id == 'base_link_fsd'
         assert fact('ready') == 'False'
         made.listen(topics.CMD_VEL)
         made.until(lambda: by_hand.ns_of(said[-1]) == START + 3 * STEP, 'the horizon')

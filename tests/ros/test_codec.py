@@ -4,6 +4,7 @@ import struct
 from functools import cache
 
 import pytest
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import AccelStamped, TwistStamped, WrenchStamped
 from helpers.strategies import QUICK
 from hypothesis import given
@@ -120,6 +121,17 @@ def test_another_frame_is_refused_alike(kind: type, which: str) -> None:
             codec.decode(data)
 
 
+@pytest.mark.parametrize('kind', READ)
+@pytest.mark.parametrize(('sec', 'nanosec'), [(-1, 10**9 - 1), (0, 10**9)])
+def test_a_stamp_that_is_none_is_refused_alike(kind: type, sec: int, nanosec: int) -> None:
+    message = as_message(kind, 3, numbers(kind, [1.0] * 13))
+    message.header.stamp = Time(sec=sec, nanosec=nanosec)
+    data = bytes(serialize_message(message))
+    for codec in (Codec(kind, FRAMES, 'topic'), long_way(kind)):
+        with pytest.raises(BadMessageError, match='topic: no stamp: expected 0 s or later'):
+            codec.decode(data)
+
+
 def test_another_child_frame_of_equal_length_is_refused() -> None:
     data = as_bytes(Odometry, 3, numbers(Odometry, [1.0] * 13), Frames(base='base_link_flu'))
     with pytest.raises(BadMessageError, match=r"child_frame_id: expected 'base_link_fsd'"):
@@ -220,3 +232,5 @@ def test_first_stamp_of_messages_that_begin_with_one() -> None:
     stamp = as_message(Clock, 5 * 10**9 + 3, ()).clock
     assert first_stamp(bytes(serialize_message(Header(stamp=stamp, frame_id='x')))) == 5 * 10**9 + 3
     assert interface.nanoseconds(stamp) == 5 * 10**9 + 3
+    with pytest.raises(BadMessageError, match='found 11 bytes'):
+        first_stamp(bytes(11))

@@ -212,6 +212,17 @@ def test_what_was_applied_is_heard_by_who_commands() -> None:
 
         peer.until(heard)
         assert client.log(0).applied[0].tolist() == [*tau]
+        clock = peer.node.create_publisher(topics.CLOCK.type, topics.CLOCK.name, 10)
+
+        def shown() -> int:
+            clock.publish(topics.CLOCK.type(clock=convert.stamp(7)))
+            client.listen(0.05)
+            return len(client.log(0).clock_ns)
+
+        peer.until(shown)
+        log = client.log(0)
+        assert log.clock_ns[0] == 7
+        assert log.applied_arrived_ns[0] <= log.clock_arrived_ns[0] <= log.ended_ns
     finally:
         client.close()
         peer.close()

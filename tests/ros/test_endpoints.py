@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from helpers.nodes_in_process import program
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy
 
 from auv_analysis import load_scenario
@@ -116,6 +117,7 @@ def test_topics_types_and_quality_of_service_are_those_of_the_contract(
         node = made.add(make, told, namespace='/auv1')
         assert ends(node.publishers) == wanted({**published, '/diagnostics': FEW}, '/auv1')
         assert ends(node.subscriptions) == wanted(heard, '/auv1')
+        assert node.graph.hardware_id == given.get('vehicle', 'auv1')
         name = node.get_name()
         own = {f'/auv1/{name}/{one}' for one in {'ready'} | SERVICES.get(name, set())}
         offered = dict(made.until(
@@ -144,12 +146,17 @@ def test_a_second_publisher_is_an_error_where_it_would_be_obeyed_as_well() -> No
 
 def test_two_clocks_are_an_error_of_who_follows_one() -> None:
     with program() as made:
-        node = made.add(SetpointNode, {'use_sim_time': True})
+        alone = {'use_sim_time': True, 'expected_subscribers': ['wrench=1']}
+        node = made.add(SetpointNode, alone)
         for _ in range(2):
             made.node.create_publisher(topics.CLOCK.type, topics.CLOCK.name, 1)
         made.until(lambda: made.node.count_publishers('/clock') == 2, 'both')
         crowd = '/clock: expected one publisher, found /test_peer, /test_peer'
         made.until(lambda: node.graph._crowd()[1] == crowd, 'an error')
+        assert node.set_parameters([Parameter('use_sim_time', value=False)])[0].successful
+        assert node.graph._crowd()[1] == '', 'nor of who follows none'
+        missing = 'wrench: expected 1 subscribers, found 0'
+        assert node.graph._missing() == missing, 'of what it does not publish'
 
 
 def test_whoever_is_in_the_loop_is_waited_for() -> None:

@@ -1,5 +1,6 @@
 """What a node says while it lives, and the end of its process."""
 
+import itertools
 import math
 import subprocess
 import sys
@@ -12,8 +13,9 @@ from helpers.node_processes import PATIENCE, environment, fresh_domain
 from helpers.nodes_in_process import program
 from helpers.patience import patience
 from rclpy.duration import Duration
+from rclpy.service import Service
 
-from auv_dynamics.ros import node_interface, node_main, topics
+from auv_dynamics.ros import convert, node_interface, node_main, topics
 from auv_dynamics.ros.node_main import BulkNode
 
 
@@ -33,6 +35,7 @@ from auv_dynamics.ros.node_main import BulkNode
 class Stuck(BulkNode):
     def __init__(self):
         super().__init__('stuck')
+        print('said')  # and not flushed
         self.exit_code = int(sys.argv[1])
 
     def destroy_node(self):
@@ -46,8 +49,11 @@ sys.exit(node_main.live([Stuck], args=[]))
 @pytest.mark.parametrize('code', [0, 1])
 def test_a_teardown_without_end_does_not_change_the_exit_code(code: int) -> None:
     command = [sys.executable, '-c', STUCK, str(code)]
-    ended = subprocess.run(command, env=environment(fresh_domain()), timeout=PATIENCE, check=False)
-    assert ended.returncode == code
+    env = environment(fresh_domain()) | {'PYTHONUNBUFFERED': ''}
+    ended = subprocess.run(
+        command, env=env, stdout=subprocess.PIPE, text=True, timeout=PATIENCE, check=False
+    )
+    assert (ended.returncode, ended.stdout) == (code, 'said\n')
 
 
 def test_all_that_has_arrived_before_the_end_is_taken() -> None:
@@ -65,6 +71,60 @@ def test_all_that_has_arrived_before_the_end_is_taken() -> None:
         assert len(taken) == 30
 
 
+def test_in_lock_step_the_time_of_a_node_is_the_newest_that_is_simulated() -> None:
+    stop, looks = threading.Event(), itertools.count()
+    with program() as made:
+        node = made.add(Made, {'lockstep': True, 'use_sim_time': True})
+        clock = made.node.create_publisher(topics.CLOCK.type, topics.CLOCK.name, 10)
+        made.until(clock.get_subscription_count)
+
+        def look() -> None:
+            if node.get_clock().now().nanoseconds == 8 or next(looks) > patience(1000.0):
+                stop.set()
+
+        node_interface.steady_timer(node, 0.01, look)
+        for ns in (3, 8):
+            clock.publish(topics.CLOCK.type(clock=convert.stamp(ns)))
+        node_main._spin([node], made.executor, stop)
+        assert node.get_clock().now().nanoseconds == 8
+
+
+def serving(*failing: Any) -> SimpleNamespace:
+    """An executor that never runs out of callbacks; those of these entities raise ValueError."""
+
+    def result() -> None:
+        if failing:
+            raise ValueError('no number')
+
+    def callback() -> None:
+        calls.append(len(calls))
+
+    callback.result = result
+    calls: list[int] = []
+    logger = SimpleNamespace(error=calls.append)
+    node = SimpleNamespace(get_logger=lambda: logger)
+    ready = callback, failing[0] if failing else None, node
+    return SimpleNamespace(calls=calls, wait_for_ready_callbacks=lambda timeout_sec: ready)
+
+
+def test_no_more_is_served_than_is_asked_for_and_a_broken_request_is_refused() -> None:
+    busy = serving()
+    node_main.serve_all(None, busy, 7)
+    assert busy.calls == [*range(7)]
+    asked = serving(object.__new__(Service))
+    assert node_main.serve(None, asked, 0.0)
+    assert asked.calls == [0, 'refused: no number']
+    with pytest.raises(ValueError, match='no number'):  # our own mistake, which ends the node
+        node_main.serve(None, serving(object()), 0.0)
+
+
+def test_the_worst_is_told_of_what_has_a_text() -> None:
+    health = [(node_interface.OK, ''), (node_interface.WARN, 'a'), (node_interface.STALE, 'b'),
+              (node_interface.ERROR, 'c')]  # fmt: skip
+    for k in range(4):
+        assert node_interface.worst([*health[k::-1], (node_interface.ERROR, '')]) == health[k]
+
+
 def test_timers_that_are_faster_than_a_look_at_services_are_served_in_time(monkeypatch) -> None:
     monkeypatch.setattr('time.monotonic', lambda: 7.0)
 
@@ -78,16 +138,18 @@ def test_timers_that_are_faster_than_a_look_at_services_are_served_in_time(monke
     assert next_look((0.04, -5.0)) == 7.0
 
 
-@pytest.mark.parametrize(('loud', 'logged'), [(math.inf, [1, 4]), (0.0, [1, 2, 3, 4])])
+@pytest.mark.parametrize(('loud', 'logged'), [(math.inf, [1, 4]), (0.0, [1, 2, 3, 4, 5])])
 def test_the_like_of_a_report_is_not_logged_at_once_again(
     monkeypatch, capfd: pytest.CaptureFixture, loud: float, logged: list[int]
 ) -> None:
     monkeypatch.setattr(node_interface, 'LOUD', loud)
     reports = [
-        f'{topic}: found {k}' for k, topic in enumerate(('odom', 'odom', 'odom', 'twist'), 1)
+        f'{topic}: found {k}'
+        for k, topic in enumerate(('odom', 'odom', 'odom', 'twist', 'odom'), 1)
     ]
     with program() as made:
         graph = made.add(Made, {}).graph
+        monkeypatch.setattr('time.monotonic', lambda: 7.0)
         for report in reports:
             graph.complain(report)
             assert graph.trouble == report

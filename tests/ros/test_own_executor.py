@@ -53,6 +53,7 @@ def test_plant_and_controller_share_the_executor_of_a_user(house: Program) -> No
     house.until(lambda: plant.plant.x[7] > 0.05 and len(wrenches) > 20)
     assert not plant.bulk
     assert not controller.bulk
+    assert (plant.take_data(), controller.take_data()) == (0, 0)
     assert plant.graph.refused.total() == 0
     user.destroy_node()
 

@@ -11,10 +11,11 @@ from helpers.node_processes import PATIENCE, Peer, fresh_domain
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.task import Future
+from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
 from auv_dynamics.files.errors import InputError, on_signals
-from auv_dynamics.ros import topics
+from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.participant import Participant, Watcher
 from auv_dynamics.ros.security import loopback
 
@@ -80,10 +81,19 @@ def test_who_says_how_it_is_lives(graph: Watcher, peer: Peer) -> None:
 
 
 def test_what_the_plant_waits_for_is_told(graph: Watcher) -> None:
+    told = graph.complete_ns, graph.running, graph.waits_for
+    assert told == (-1, False, 'plant_node to appear')
     graph._asked = Future()
     graph._asked.set_result(SetBool.Response(success=False, message='analysis_node'))
     assert not graph.ask_to_run()
     assert graph.waits_for == 'analysis_node to be ready'
+    assert graph._asked is None, 'it can be asked again'
+
+
+def test_progress_does_not_go_back(graph: Watcher) -> None:
+    for ns in (5, 3):
+        graph._on_progress(Header(stamp=convert.stamp(ns)))
+    assert graph.complete_ns == 5
 
 
 def interrupted(inner: Callable[..., Any], ended: list[str]) -> Callable[..., Any]:

@@ -4,11 +4,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.node_processes import Peer, assert_one_line, graph, parameters, run_node
+from helpers.node_processes import Peer, graph, parameters
+from helpers.nodes_in_process import program
 from helpers.patience import patience
 from helpers.stalls import undisturbed
 from numpy.testing import assert_allclose, assert_array_equal
 
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.nodes.plant_node import PlantNode
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
 
@@ -134,10 +137,14 @@ def in_real_time(heard_again: int, last: int) -> tuple[list[int], list[int], np.
         ({'kind': 'sensor_bias'}, ('faults.a', 'velocity, attitude')),
         ({'kind': 'sensor_drop_out', '_from': 0.5, 'to': 0.2}, ('faults.a.to', 'after from')),
         ({'kind': 'actuator', 'axis': 'yaw'}, ('faults.a', 'efficiency or stuck')),
-        ({'kind': 'thruster', 'thruster': 'one', 'stuck': 1.0}, ('faults.a.thruster', 'has none')),
+        ({'kind': 'thruster', 'thruster': 'T1', 'stuck': 1.0}, ('faults.a.thruster', 'has none')),
+        ({'kind': 'thruster', 'thruster': 'T1', 'stuck': 1.0}, ('a.thruster', '{thrusters: true}')),
         ({'kind': 'wrench_loss', 'delay': 1.0}, ('faults.a.delay', 'one of')),
     ],
 )
 def test_wrong_faults_end_with_one_line(entry: dict[str, Any], words: tuple[str, ...]) -> None:
-    plant = parameters(vehicle='herman2018', lockstep=True, duration=1.0)
-    assert_one_line(run_node(PLANT, *plant, *faults(a=entry)), *words)
+    vehicle = 'bluerov2_heavy' if '{thrusters: true}' in words else 'herman2018'
+    plant = parameters(vehicle=vehicle, lockstep=True, duration=1.0)
+    with program() as made, pytest.raises(InputError) as caught:
+        made.add(PlantNode, [*plant, *faults(a=entry)])
+    assert all(word in str(caught.value) for word in words)

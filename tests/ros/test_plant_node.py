@@ -283,6 +283,8 @@ def test_credit_holds_the_plant_while_the_recorder_is_behind(peer) -> None:
     acknowledged(5)
     answered(peer, 5, 1)
     peer.until(lambda: len(peer.heard['disturbance']) == 6, 'the last wrench')
+    acknowledged(5)
+    peer.spin(0.1)
     peer.publish(topics.WRENCH, wrench(5))
     peer.until(lambda: plant.graph.refused.total() == 1, 'a second answer to be refused')
     assert len(peer.heard['disturbance']) == 6

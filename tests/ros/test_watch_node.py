@@ -82,6 +82,8 @@ def test_numbers_of_every_kind_come_in_and_broken_messages_are_errors(ears: Ears
         for topic in (topics.ODOM, topics.CMD_VEL, topics.WRENCH, topics.KINETIC_ENERGY)
     }
     shares = ears.publisher(topics.KINETIC_ENERGY_SHARES, BEST_EFFORT)
+    subscribed = ears.listener._node.data_subscriptions()
+    assert subscribed[0].topic_name == '/cmd_vel', 'it is taken before the odometry'
     publish[topics.CMD_VEL](convert.twist(0, (0.4,) * 6, FRAMES))
     for k in range(20):
         publish[topics.ODOM](convert.odometry(k * STEP, STATE, FRAMES))
@@ -97,6 +99,8 @@ def test_numbers_of_every_kind_come_in_and_broken_messages_are_errors(ears: Ears
     assert (found.time, found.alerts) == (0.19, ())
     odometry = ears.topic(topics.ODOM)
     assert (odometry.heard, odometry.gaps, odometry.repeats) == (20, 0, 0)
+    publish[topics.ODOM](convert.odometry(22 * STEP, STATE, FRAMES))
+    ears.until(lambda: ears.topic(topics.ODOM).gaps)
 
     publish[topics.WRENCH](convert.wrench(20 * STEP, (float('nan'), *[0.0] * 5), FRAMES))
     publish[topics.ODOM](convert.odometry(20 * STEP, STATE, Frames('map', FRAMES.base)))

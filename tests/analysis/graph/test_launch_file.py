@@ -48,6 +48,7 @@ def test_every_node_gets_its_parameters_and_the_bag_that_of_its_namespace(launch
     assert Path(given['recorder_node']['bag']) == Path('runs/case1/auv1/gvc').resolve()
     assert all(given[name]['use_sim_time'] == (name != 'plant_node') for name in names)
     kept = dict(entry.split('=') for entry in given['recorder_node']['attachments'])
+    assert kept.keys() == {'params.yaml', 'scenario.yaml', 'vehicle.yaml'}
     assert [kept['params.yaml']] == of('Node', listed)[0].named['parameters']
     _, given = nodes(actions(launch_file, bag='elsewhere'))
     assert Path(given['recorder_node']['bag']) == Path('elsewhere').resolve()
@@ -61,7 +62,7 @@ def test_a_node_is_left_out_alone(launch_file, left_out: str) -> None:
 
 
 def test_lock_step_and_the_clock_are_two_switches(launch_file) -> None:
-    _, given = nodes(actions(launch_file, use_sim_time='false'))
+    _, given = nodes(actions(launch_file, use_sim_time='false', plant='True'))
     assert given['controller_node']['lockstep']
     assert not given['controller_node']['use_sim_time']
     _, given = nodes(actions(launch_file, lockstep='false'))
@@ -106,11 +107,19 @@ def test_margins_are_said_before_a_vehicle_is_driven(launch_file, tmp_path: Path
     assert any(one.startswith('warning: ') and 'degrees?' in one for one in said())
 
 
-@pytest.mark.parametrize('switch', ['plant', 'record', 'analysis', 'use_sim_time', 'lockstep'])
-def test_a_switch_takes_no_other_word(launch_file, switch: str) -> None:
+@pytest.mark.parametrize(
+    ('switch', 'about'),
+    [
+        ('plant', 'simulate the vehicle'), ('publish_clock', 'the plant publishes /clock'),
+        ('record', 'write a bag'), ('analysis', 'analysis/*'),
+        ('use_sim_time', 'default: true with a /clock'), ('lockstep', 'false without'),
+    ],
+)  # fmt: skip
+def test_a_switch_is_described_and_takes_no_other_word(launch_file, switch, about) -> None:
     described = launch_file['generate_launch_description']().positional[0]
     declared = {one.positional[0]: one.named for one in described if one.positional}
     assert 'maybe' not in declared[switch]['choices']
+    assert about in declared[switch]['description']
     assert declared[switch]['default_value'] in declared[switch]['choices']
 
 

@@ -21,7 +21,8 @@ def test_timing_motion_and_answers_of_a_driver(tmp_path) -> None:
     rng = RNG(9)
     arrived = np.cumsum(rng.integers(5_000_000, 30_000_000, 60)) + 9_000_000_000
     stamps = arrived - rng.integers(1_000_000, 9_000_000, 60)
-    log = Made(arrived_ns=arrived, stamp_ns=stamps, began_ns=9_000_000_000)
+    order = [*range(57), 58, 57, 59]  # as they were taken, not as they arrived
+    log = Made(arrived_ns=arrived[order], stamp_ns=stamps[order], began_ns=9_000_000_000)
     rates = {
         word: Made(
             t=np.arange(20) * 0.1, path=rng.normal(size=(20, 3)), velocity=rng.normal(size=(20, 3))
@@ -32,7 +33,7 @@ def test_timing_motion_and_answers_of_a_driver(tmp_path) -> None:
         Made(trial=Made(axis=axis, dof=DOFS[axis], speed_unit=VELOCITY[axis // 3]),
              t=np.arange(30) * 0.2, nu=rng.normal(size=(30, 6)),
              response=Made(t=np.arange(10) * 0.5, delay=0.3, form=rng.normal(size=10)))
-        for axis in (4, 1)
+        for axis in (4, 1, 2)
     ]  # fmt: skip
     evidence = Made(log=log, settings=Settings(), has_motion=True, rates=rates, answered=trials)
     with artists.captured() as figures:
@@ -49,7 +50,7 @@ def test_timing_motion_and_answers_of_a_driver(tmp_path) -> None:
     assert (right.get_xlabel(), right.get_ylabel()) == ('$t$ (s)', 'older than the freshest (ms)')
     ages = (arrived - stamps) / 1e6
     (curve,) = map(points, artists.lines(right))
-    same(curve, arrived / 1e9 - 9.0, ages - ages.min())
+    same(curve, (arrived / 1e9 - 9.0)[order], (ages - ages.min())[order])
     for word, unit, half in (('linear', 'm/s', DOFS[:3]), ('angular', 'rad/s', DOFS[3:])):
         figure = figures[word]
         for i, (axes, dof) in enumerate(zip(figure.axes, half, strict=True)):
@@ -59,7 +60,9 @@ def test_timing_motion_and_answers_of_a_driver(tmp_path) -> None:
             same(shown['by the pose'], rates[word].t, rates[word].path[:, i])
             same(shown['twist'], rates[word].t, rates[word].velocity[:, i])
         assert {t.get_text() for t in figure.legends[0].get_texts()} == {'by the pose', 'twist'}
-    for axes, one in zip(figures['answers'].axes, trials, strict=True):
+    *panels, unused = figures['answers'].axes
+    assert not unused.lines
+    for axes, one in zip(panels, trials, strict=True):
         assert axes.get_ylabel() == f'{one.trial.dof} ({one.trial.speed_unit})'
         shown = {line.get_label(): points(line) for line in artists.lines(axes)}
         nu = one.nu[:, one.trial.axis]
@@ -74,3 +77,20 @@ def test_what_little_was_heard_is_drawn_or_left_out(tmp_path, count: int, drawn:
     evidence = Made(log=log, settings=Settings(), has_motion=False, answered=[])
     with artists.captured():
         assert set(driver.draw(evidence, tmp_path)) == drawn
+
+
+@pytest.mark.parametrize(('ticks', 'ages'), [(2, [np.nan, 3.0, 0.0]), (0, [0.0] * 3)])
+def test_ages_by_a_simulated_clock_begin_with_it(tmp_path, ticks: int, ages: list[float]) -> None:
+    """It is first heard after the first message; the next are 5 and 2 ms old."""
+    began, clock = 9_000_000_000, np.array([105_000_000, 125_000_000])
+    log = Made(
+        arrived_ns=began + np.array([1_000_000, 3_000_000, 5_000_000]), began_ns=began,
+        stamp_ns=np.array([80_000_000, 100_000_000, 123_000_000]),
+        clock_ns=clock[:ticks], clock_arrived_ns=began + np.array([2_000_000, 4_000_000])[:ticks],
+    )  # fmt: skip
+    settings = Settings(sim_time=True)
+    evidence = Made(log=log, settings=settings, has_motion=False, answered=[])
+    with artists.captured() as figures:
+        driver.draw(evidence, tmp_path)
+    (line,) = artists.lines(figures['timing'].axes[1])
+    np.testing.assert_allclose(line.get_ydata(), ages, atol=1e-9)

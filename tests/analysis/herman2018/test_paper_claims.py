@@ -20,7 +20,7 @@ from auv_analysis.herman2018.cases import (
     paper_claims,
 )
 from auv_analysis.herman2018.claims import judged, write_claims
-from auv_analysis.herman2018.evidence import ErrorSensitivity, Quotes
+from auv_analysis.herman2018.evidence import ErrorSensitivity, Quotes, percent
 from auv_analysis.herman2018.responses import (
     ERROR,
     STEP,
@@ -191,6 +191,10 @@ def test_a_sensitivity_at_hand_is_taken_not_another():
     for one, other in (('gvc', 'cl'), ('cl', 'gvc')):
         name = 'RMS error of pitch by the gains'
         assert named(found)[f'{name}, {one}'] == usual[f'{name}, {other}']
+    scenario = load_scenario('case2')  # whose gains the claim is not of
+    runs = {law: simulate(scenario, law) for law in scenario.controllers}
+    found = paper_claims(scenario, runs, exchanged, threads=2).claims[14]
+    assert named(found) == named(study('case2').claims[14])
 
 
 def test_what_is_simulated_beside_a_study_is_held_as_its_runs_are():
@@ -226,6 +230,14 @@ def test_every_kind_of_departure_from_the_shipped_case_is_named():
     }  # fmt: skip
     found = {path for path, *_ in departures_of(changed_scenario(load_scenario('case1'), values))}
     assert found == {path.partition('[')[0] for path in values}
+    less = {'setpoint': {'surge': {'offset': 0.3}}, 'vehicle.name': 'mine', 'vehicle.source': 'me'}
+    ours = changed_scenario(load_scenario('case1'), less)
+    shipped = load_scenario('case1').data['setpoint']
+    assert {path: theirs for path, _, theirs in departures_of(ours)} == {
+        'setpoint.surge.offset': shipped['surge'].get('offset'),
+        'setpoint.surge.terms': shipped['surge'].get('terms'),
+        **{f'setpoint.{dof}': entry for dof, entry in shipped.items() if dof != 'surge'},
+    }
 
 
 @pytest.mark.parametrize(
@@ -256,6 +268,7 @@ def test_a_name_has_one_value():
     quote = Quotes()
     assert quote('a', 1.0, 'm') == quote('a', 1.0, 'm') == '1.00'
     assert quote('b', np.inf) == 'unbounded'
+    assert [percent(x) for x in (-0.04, -0.06, 12.34)] == ['+0.0', '−0.1', '+12.3']
     assert [entry.value for entry in quote.values] == [1.0, None]
     with pytest.raises(ValueError, match='one value of a'):
         quote('a', 2.0, 'm')

@@ -235,7 +235,7 @@ def judge_runs(
 
     """
     scenarios = {run.scenario for run in runs.values()}
-    ours = len(scenarios) == 1 and scenarios <= set(CASES)
+    ours = len(scenarios) == 1 and scenarios.issubset(CASES)
     if not ours or not any(is_plain(run) for run in runs.values()):
         return []
     (scenario,) = scenarios
@@ -274,7 +274,7 @@ def judged(cases: Mapping[str, Evidence]) -> list[Claim]:
 
 
 def _claim(index: int, row: Row, cases: Mapping[str, Evidence]) -> Claim:
-    case = next((name for name in cases if name in row.cases), row.cases[0])
+    case = next(name for name in (*cases, *row.cases) if name in row.cases)
     verdict, reason = _obstacle(row, case, cases.get(case))
     texts = index, row.claim, row.paper
     if verdict:
@@ -362,9 +362,8 @@ def _counts(claims: Sequence[Claim]) -> Iterator[str]:
     for word, rows in counts.items():
         numbers = f' (no. {join([str(row.number) for row in rows])})'
         parts.append(f'{len(rows)} {word}{"" if word == "reproduced" else numbers}')
-    outcome = f': {join(parts)}' if parts else ''
     decided = sum(map(len, counts.values()))
-    yield f'Of the paper’s {len(claims)} claims these runs decide {decided}{outcome}.'
+    yield f'Of the paper’s {len(claims)} claims these runs decide {decided}: {join(parts)}.'
 
 
 def write_claims(folder: Path, claims: Sequence[Claim]) -> Path:

@@ -277,7 +277,7 @@ def _only_pitch(gvc: Signals) -> bool:
 
 def _largest(quote: Quotes, law: str, words: str, values: np.ndarray) -> str:
     """'gvc Δq 0.31 (Δp 0.35)': pitch's number and the largest of the others."""
-    i = int(np.argmax(np.where(np.arange(6) == Q, -1.0, values)))
+    i = max({*range(6)} - {Q}, key=lambda axis: float(values[axis]))
     name = f'RMS error of {{}} by {words}, {law}'
     return (
         f'{law} {ERRORS[Q]} {quote(name.format(DOFS[Q]), values[Q], "", 2)} '

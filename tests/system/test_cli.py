@@ -31,6 +31,7 @@ from auv_analysis.cli import main, scenario_runs
 from auv_analysis.cli.main import COMMANDS
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
 from auv_analysis.output.folder import SWEEP, sha256_of, write_manifest
+from auv_analysis.report.verdict import FAILED
 from auv_dynamics.files.shipped import shipped
 
 AUV = Path(sys.executable).with_name('auv')
@@ -225,6 +226,16 @@ def test_params_for_a_driver_know_neither_plant_nor_simulated_time(folder, capsy
     assert 'wrench=2' in nodes['controller_node']['expected_subscribers']
 
 
+def test_params_replace_an_earlier_file_where_asked_and_never_the_scenario(folder) -> None:
+    Path('short.yaml').write_text(SHORT.replace('OFFSET', '0.5').replace('GAIN', '12'))
+    for line, code in (
+        ('gvc.yaml', 0), ('gvc.yaml', 2), ('gvc.yaml --overwrite', 0), ('short.yaml --overwrite', 2)
+    ):  # fmt: skip
+        given = 'params', 'short.yaml', '--controller', 'gvc', '--out', *line.split()
+        assert _exit_code(*given) == code, line
+    assert 'name: short' in Path('short.yaml').read_text()
+
+
 SHORT = """
 name: short
 vehicle: herman2018_neutral
@@ -254,7 +265,10 @@ def test_simulate_prints_one_document_and_leaves_its_files(offset, options, fold
     assert {path.name for path in results.iterdir()} == (left if options else left | report)
 
 
-@pytest.mark.parametrize('option', ['--no-report', '--map x', '--odom x', '--law x', '--vehicle x'])
+@pytest.mark.parametrize('option', [
+    '--no-report', '--map x', '--odom x', '--law x', '--vehicle x', '--namespace x', '--wrench x',
+    '--setpoint x', '--frames ned_fsd', '--twist-frame child', '--step 1', '--gap 1',
+])  # fmt: skip
 def test_what_is_of_runs_is_refused_with_a_sweep(option, folder, capsys) -> None:
     Path('taken', SWEEP).write_text('{}')
     code = _exit_code('analyze', 'taken', *option.split())
@@ -453,17 +467,24 @@ def test_a_controller_that_diverges_leaves_the_others_their_report(folder, capsy
     errors = said.err.splitlines()
     assert json.loads(said.out) == json.loads(Path('lauv/summary.json').read_text())
     assert errors[-1] == 'case1_lauv, cl: the closed loop diverges, not finite from t = 0.27 s'
-    assert json.loads(Path('lauv/summary.json').read_text()).keys() == {'gvc'}
+    (summary,) = json.loads(Path('lauv/summary.json').read_text()).values()
+    assert summary['law'] == 'gvc'
+    assert summary['notes'] == [f'{FAILED}: {errors[-1]}']
     assert Path('lauv/report.html').exists()
 
 
 def test_of_several_that_fail_the_first_is_named(folder, monkeypatch, capsys) -> None:
+    tried = []
+
     def diverge(_scenario: object, name: str, _hold: str) -> None:
+        tried.append(name)
         raise ArithmeticError(f'{name} diverges')
 
     monkeypatch.setattr(scenario_runs, 'simulate', diverge)
-    assert _exit_code('simulate', 'case1') == 1
-    assert capsys.readouterr().err.splitlines()[-1] == 'gvc diverges'
+    asked = [word for name in ('cl', 'gvc', 'cl') for word in ('--controller', name)]
+    assert _exit_code('simulate', 'case1', *asked) == 1
+    assert tried == ['cl', 'gvc']
+    assert capsys.readouterr().err.splitlines()[-1] == 'cl diverges'
 
 
 CALLBACK = ctypes.CFUNCTYPE(None)

@@ -3,6 +3,7 @@
 from argparse import Namespace
 from html import unescape
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -65,8 +66,9 @@ def test_results_are_named_after_the_scenarios(scenarios, folder, tmp_path, monk
     assert [path.name for path in Path('runs').iterdir()] == [f'analyze_{folder}']
 
 
-def test_three_runs_are_shown_one_by_one_and_more_side_by_side(monkeypatch) -> None:
-    monkeypatch.setattr(sources, 'sources_of', lambda results, *_: results)
+def test_three_runs_are_shown_one_by_one_and_more_side_by_side(tmp_path, monkeypatch) -> None:
+    read = SimpleNamespace(files=[tmp_path / 'read.bin'])
+    monkeypatch.setattr(sources, 'sources_of', lambda results, *_: [read] * len(results))
     for name in ('_few', '_many'):
         monkeypatch.setattr(analyze, name, lambda *_, name=name: name)
     grammar = main.parser()
@@ -74,6 +76,12 @@ def test_three_runs_are_shown_one_by_one_and_more_side_by_side(monkeypatch) -> N
     assert found == ['_few', '_many']
     with pytest.raises(InputError, match=r'^--law: expected .*nearest: gvc'):
         analyze.run(grammar.parse_args(['analyze', 'a', '--law', 'gvcc']))
+    read.files[0].touch()  # a folder that is in use is refused before anything is read
+    with pytest.raises(InputError, match='--overwrite'):
+        analyze.run(grammar.parse_args(['analyze', 'a', '--out', str(tmp_path)]))
+    write_manifest(tmp_path, {'read.bin': sha256_of(read.files[0])})
+    with pytest.raises(InputError, match=r'read\.bin'):
+        analyze.run(grammar.parse_args(['analyze', 'a', '--out', str(tmp_path), '--overwrite']))
 
 
 def test_a_sweep_is_explored_as_it_was_asked_for(monkeypatch) -> None:

@@ -75,13 +75,13 @@ class Client(SimulatedDriver):
         return super().log()
 
     def graph(self, place: str, **_: object):
-        return graph()
+        return replace(graph(), place=place)
 
     def publishes(self) -> bool:
         return True
 
     def close(self) -> None:
-        pass
+        self.closed = True
 
 
 def test_a_vehicle_with_a_fault_is_not_moved_and_options_are_heard(monkeypatch, capsys) -> None:
@@ -99,14 +99,54 @@ def test_a_vehicle_with_a_fault_is_not_moved_and_options_are_heard(monkeypatch, 
     (client,) = Client.made
     told = {'odom': 'nav/odom', 'wrench': '/thrust'}
     assert client.given == (7, '/auv1', told, Frames('map', 'body'))
-    assert (client.commands, client.sent) == (True, [])
+    assert (client.commands, client.sent, client.closed) == (True, [], True)
     document = json.loads(capsys.readouterr().out)
+    assert document['place'] == 'ROS_DOMAIN_ID=7, namespace /auv1'
     settings = document['settings']
     assert (settings['rate'], settings['sim_time'], settings['actuates']) == (7.0, True, True)
     assert settings['frames'] == {'odom': 'map', 'base': 'body'}
-    verdicts = {one['id']: one['verdict'] for one in document['checks']}
-    assert verdicts['frames'] == 'fail'
-    assert verdicts['response_surge'] == NOT_CHECKED
+    said = {one['id']: (one['verdict'], one['found']) for one in document['checks']}
+    assert said['frames'][0] == 'fail'
+    assert said['response_surge'][0] == NOT_CHECKED
+    assert said['response_surge'][1].startswith('nothing was sent, since frames ')
+
+
+class Clock:
+    """Stands for `time`; a client listens by it, from 2 s on to messages, if at all."""
+
+    def __init__(self, *, sends: bool, publishes: bool) -> None:
+        self.now, self.listened = 0.0, list[float]()
+        self._sends, self._publishes = sends, publishes
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def time_ns(self) -> int:
+        return round(self.now * 1e9)
+
+    @property
+    def buffer(self) -> range:
+        return range(self._sends and self.now >= 2.0)
+
+    def listen(self, seconds: float) -> None:
+        self.listened.append(seconds)
+        self.now += seconds
+
+    def publishes(self) -> bool:
+        return self._publishes
+
+
+@pytest.mark.parametrize(
+    ('sends', 'publishes', 'began', 'ended'),
+    [(True, True, 2.0, 2.25), (False, True, 5.0, 5.25), (False, False, 5.0, 5.0)],
+)
+def test_it_listens_from_the_first_odometry_on(sends, publishes, began, ended, monkeypatch) -> None:
+    clock = Clock(sends=sends, publishes=publishes)
+    monkeypatch.setattr(check_driver, 'time', clock)
+    found = check_driver._listen(clock, 0.25)
+    assert found / 1e9 == pytest.approx(began, abs=1.01 * check_driver.LOOK)
+    assert clock.now == pytest.approx(found / 1e9 + ended - began)
+    assert max(clock.listened) <= check_driver.LOOK
 
 
 def test_a_document_is_json_and_counts_add_up() -> None:
@@ -254,11 +294,12 @@ def test_a_folder_that_is_there_is_refused_before_anything_is_heard(tmp_path, ca
     assert (tmp_path / 'mine.txt').read_text() == 'kept'
 
 
-def test_results_of_an_earlier_check_are_replaced_when_asked(tmp_path, monkeypatch) -> None:
+def test_results_of_an_earlier_check_are_replaced_when_asked(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.setattr(report, 'write_results', lambda out, *_: (out / 'check.json').touch())
-    options = SimpleNamespace(json=True, out=tmp_path / 'out', overwrite=True, vehicle=None)
-    for _ in range(2):
+    for quiet in (True, False):
+        options = SimpleNamespace(json=quiet, out=tmp_path / 'out', overwrite=True, vehicle=None)
         check_driver._conclude(options, listened())
+        assert ('upright' in capsys.readouterr().out) is not quiet
 
 
 def test_nothing_is_sent_unless_those_pass_on_whom_safety_rests() -> None:

@@ -114,6 +114,7 @@ def test_vehicle_is_found(spelling, tmp_path, monkeypatch) -> None:
     assert scenario.inputs == [tmp_path / 'case/scenario.yaml', scenario.vehicle_path]
     np.testing.assert_array_equal(scenario.vehicle.M, load_vehicle('rexrov').M)
     assert scenario.attachments['vehicle.yaml'] == text
+    assert scenario.shipped_vehicle == ('rexrov' if spelling == 'bare' else None)
 
 
 @pytest.mark.parametrize('vehicle', ['mine.yaml', 'mine'])
@@ -278,6 +279,9 @@ def test_a_run_of_too_many_steps_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize('name', ['summary', 'gvc'])
 def test_no_controller_has_the_name_of_our_own_files(name: str, tmp_path: Path) -> None:
     check_names(['gvc', name], tmp_path)
+    for ours in ('summary.json', 'unfinished', 'rollouts'):
+        with pytest.raises(InputError, match=f'our own files, found {ours}'):
+            check_names([ours], tmp_path)
     refused = pytest.raises(InputError, match=f'controllers: .* our own files, found {name}')
     with refused if name == 'summary' else nullcontext():
         check_names(['gvc', name], tmp_path, ('.npz', '.json'))

@@ -227,8 +227,8 @@ class Scenario(Devices):
     @property
     def shipped_vehicle(self) -> str | None:
         """Bare name of the vehicle where it is a shipped one."""
-        named = self.vehicle_path.with_suffix('').name
-        return named if named == self.data['vehicle'] else None
+        name = self.data['vehicle']
+        return name if self.vehicle_path.name == f'{name}.yaml' else None
 
     def controller(self, name: str) -> dict[str, Any]:
         """Law and gains of one controller; InputError when there is none of that name."""

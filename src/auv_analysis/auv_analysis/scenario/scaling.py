@@ -79,7 +79,7 @@ def _slower(harmonics: dict[str, Any]) -> dict[str, Any]:
     if 'offset' in harmonics:
         slower['offset'] = SLOWER * harmonics['offset']
     slower['terms'] = [
-        term | {'amplitude': SLOWER * term['amplitude']} for term in harmonics.get('terms', [])
+        term | {'amplitude': SLOWER * term['amplitude']} for term in harmonics['terms']
     ]
     return slower
 
@@ -103,8 +103,8 @@ def scenario_text(scenario: dict[str, Any]) -> str:
 
 
 def _peak(harmonics: dict[str, Any]) -> float:
-    """Bound of a harmonic: offset plus all amplitudes."""
-    return abs(harmonics.get('offset', 0.0)) + sum(abs(t['amplitude']) for t in harmonics['terms'])
+    """Bound of a harmonic of (35): offset plus all amplitudes, none of which is negative."""
+    return harmonics.get('offset', 0.0) + sum(term['amplitude'] for term in harmonics['terms'])
 
 
 def write_scaled_scenarios(folder: Path) -> list[Path]:

@@ -88,6 +88,7 @@ UNREACHED = {  # path -> what its one line says
     'setpoint.surge.terms[1].amplitude': 'setpoint.surge.terms.1.: expected an index below 1',
     'setpoint.north.offset': 'setpoint.north: expected one of .*, found north',
     'setpoint.surge.ofset': 'setpoint.surge.ofset: .*nearest: offset',
+    'setpoint.sway.offset.x': 'setpoint.sway.offset.x: expected a single value, found x',
     'disturbance[1].mass': 'disturbance.1.: expected an index below 1',
     'disturbance[0].mass': 'disturbance.0..mass: expected one of kind, exponent_sign, scale',
     'duration.s': 'duration: expected a mapping that has s, found 30.0',
@@ -128,6 +129,7 @@ def test_another_vehicle_is_put_in_place_before_its_values_are() -> None:
     by_contents = changed_scenario(CASE1, {**values, 'vehicle': contents})
     for new in (by_name, by_contents):
         assert (new.vehicle.name, new.vehicle_data['rigid_body']['mass']) == ('rexrov', 1900.0)
+    assert by_name.shipped_vehicle == 'rexrov'
     assert CASE1.vehicle.name == 'herman2018'
 
 
@@ -161,6 +163,7 @@ def test_setpoint_file_may_be_another_one(tmp_path) -> None:
     slow = load_scenario(path)
     fast = changed_scenario(slow, {'setpoint.file': 'fast.csv', 'duration': 2.0})
     assert fast.setpoint.value(1.0)[0] == 0.9
+    assert fast.inputs[-1] == (tmp_path / 'fast.csv').resolve(), 'no result may replace it'
     assert changed_scenario(slow, {'duration': 2.0}).setpoint.value(1.0)[0] == 0.1
     (tmp_path / 'slow.csv').unlink()  # its text has been read: workers elsewhere have no file
     assert changed_scenario(slow, {'duration': 2.0}).setpoint.value(1.0)[0] == 0.1

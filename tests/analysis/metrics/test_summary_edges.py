@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.metrics.summary import lumped_error, settling_time
+from auv_analysis.metrics.summary import estimate_figures, lumped_error, settling_time
 
 
 @pytest.fixture(scope='module')
@@ -71,6 +71,18 @@ def test_without_set_points_or_a_disturbance_there_is_no_error_to_tell(run):
     summary = summarize(blind)
     assert set(summary['velocity_error'].values()) == {None}
     assert summary['velocity']['rms'] == summarize(run)['velocity']['rms']
+
+
+def test_of_a_wrench_that_was_estimated_each_figure_is_its_own():
+    six = np.arange(1.0, 7.0)
+    wrench, error = np.array([2.0, -4.0])[:, None] * six, np.array([0.6, 0.8])[:, None] * six
+    found = estimate_figures(wrench, error)
+    factors = {'mean': -1.0, 'rms': np.sqrt(10.0), 'max': 4.0, 'error_rms': np.sqrt(0.5)}
+    assert found == {name: pytest.approx(factor * six) for name, factor in factors.items()}
+    assert estimate_figures(wrench, None) is estimate_figures(None, error) is None
+    assert estimate_figures(np.full((2, 6), np.nan), error) is None
+    known = np.where(np.arange(6) < 3, wrench, np.nan)
+    assert estimate_figures(known, error)['max'][:3] == [4.0, 8.0, 12.0]
 
 
 def test_what_overflows_is_null(run):

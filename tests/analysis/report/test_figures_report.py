@@ -335,9 +335,12 @@ def test_numbers_as_text():
     assert [plain(x) for x in (12.0, 0.8, -0.025, 30000.0, 0)] == [
         '12', '0.8', '−0.025', '30\u202f000', '0',
     ]  # fmt: skip
+    assert [plain(x) for x in (1.5e9, -1e-7)] == ['1.5·10⁹', '−1·10⁻⁷']
     assert [fixed(x, 2) for x in (-4.016, None)] == ['−4.02', '–']
+    assert [fixed(x, 1) for x in (12345.67, np.nan)] == ['12\u202f345.7', '–']
     assert [capital(text) for text in ('', 'a', 'aB c', 'Δξ')] == ['', 'A', 'AB c', 'Δξ']
     assert [join(words) for words in ([], ['a'], ['a', 'b'], ['a', 'b', 'c'])] == [
         '', 'a', 'a and b', 'a, b and c',
     ]  # fmt: skip
     assert tied('840 N m in 2 s') == '840\u00a0N\u00a0m in 2\u00a0s'
+    assert tied('5 %, 3 kg, 2 m/s, 4 mm') == '5\u00a0%, 3\u00a0kg, 2\u00a0m/s, 4 mm'

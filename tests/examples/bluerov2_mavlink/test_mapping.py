@@ -11,6 +11,9 @@ from wrench_mapping import FOUR, SIGNS, PilotAxes, WrenchMapping, rc_override
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.shipped import shipped
+from auv_dynamics.files.yaml_files import read_yaml
+from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 
 VEHICLES = {name: load_vehicle(name) for name in ('bluerov2_heavy', 'bluerov2')}
 ALL = tuple(range(6))
@@ -109,6 +112,12 @@ def test_the_supply_is_taken_into_account(voltage: float) -> None:
 def test_other_thrusters_are_refused() -> None:
     with pytest.raises(InputError, match='expected a vehicle with thrusters, found none'):
         WrenchMapping(load_vehicle('rexrov'), ALL, 16.0)
+    data = read_yaml(shipped('vehicles', 'bluerov2_heavy'), 'vehicle')
+    for i in (0, 1):
+        ahead = {'name': f'ahead {i}', 'position': [0.3, 0.2 - 0.4 * i, 0.0]}
+        data['thrusters'].append(data['thrusters'][i] | ahead)
+    with pytest.raises(InputError, match='found 6 thrusters for 3 degrees of freedom'):
+        WrenchMapping(vehicle_from_dict(data, 'mine'), ALL, 16.0)
 
 
 def test_neutral_stays_where_it_is() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from helpers.mavlink_pair import SECOND, Pair
-from navigation import ENOUGH, BootClock, Exchange, Navigation, RestartedError, turned
+from navigation import ENOUGH, KEPT, BootClock, Exchange, Navigation, RestartedError, turned
 from numpy.testing import assert_allclose
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -75,12 +75,70 @@ def test_a_clock_that_stood_still_is_no_other_boot() -> None:
     assert clock.local(0) == OFFSET + 300 * MS
 
 
+def attitude(ms: int, *numbers: float) -> mavlink.MAVLink_attitude_message:
+    return mavlink.MAVLink_attitude_message(ms, *(numbers or [0.0] * 6))
+
+
+def position(ms: int, *numbers: float) -> mavlink.MAVLink_local_position_ned_message:
+    return mavlink.MAVLink_local_position_ned_message(ms, *(numbers or [0.0] * 6))
+
+
 def test_a_position_without_an_attitude_of_its_time_is_no_odometry() -> None:
     navigation = Navigation(known())
-    navigation.attitude(mavlink.MAVLink_attitude_message(1000, *[0.0] * 6))
-    given = {ms: navigation.position(mavlink.MAVLink_local_position_ned_message(ms, *[0.0] * 6))
-             for ms in (1100, 1101)}  # fmt: skip
-    assert [sample is None for sample in given.values()] == [False, True]
+    assert navigation.position(position(800)) is None
+    navigation.attitude(attitude(1000))
+    given = [navigation.position(position(ms)) for ms in (899, 900, 900, 1100, 1099, 1101)]
+    assert [sample is None for sample in given] == [True, False, True, False, True, True]
+
+
+def test_attitude_is_turned_to_the_time_of_the_position() -> None:
+    navigation = Navigation(known())
+    navigation.attitude(attitude(1000, 0.0, 0.0, 0.3, 0.0, 0.0, 2.0))
+    sample = navigation.position(position(1050, 1.0, 2.0, 3.0, 0.5, 0.0, 0.25))
+    assert sample.ns == known().local(1050 * MS)
+    body = [0.5 * np.cos(0.4), -0.5 * np.sin(0.4), 0.25, 0.0, 0.0, 2.0]
+    half = [np.cos(0.2), 0.0, 0.0, np.sin(0.2)]
+    assert_allclose(sample.x, [1.0, 2.0, 3.0, *half, *body], atol=1e-12)
+
+
+def test_boot_times_that_fall_back_far_are_of_another_boot() -> None:
+    navigation = Navigation(known())
+    navigation.attitude(attitude(5000))
+    navigation.attitude(attitude(4000, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+    assert navigation.position(position(5000)).x[3] == 1.0, 'what comes late is not taken'
+    with pytest.raises(RestartedError, match='fell back from 5000 ms to 3999 ms'):
+        navigation.position(position(3999))
+    navigation.reset()
+    assert navigation.position(position(10)) is None, 'its attitude is forgotten'
+
+
+def test_offsets_agree_as_far_as_the_ways_may_have_been_uneven() -> None:
+    one = exchange(0, 3.0, 9.0)  # half the round trips: 6 and 2 ms
+    for apart, agrees in ((50 + 6 + 2, True), (50 + 6 + 2 + 1, False)):  # ms
+        for sign in (1, -1):
+            other = exchange(0, 2.0, 2.0, offset=one.offset + sign * apart * MS)
+            assert one.agrees(other) == other.agrees(one) == agrees
+
+
+def test_exchanges_that_do_not_agree_with_each_other_are_no_boot() -> None:
+    clock = known()
+    for i in range(2 * ENOUGH):
+        clock.add(exchange(22_000 + 100 * i, 1.0, 1.0, offset=OFFSET + (8 + i) * 1000 * MS))
+    assert clock.local(0) == known().local(0)
+    assert (known().settled, clock.settled) == (True, False)
+    clock.add(exchange(30_000, 1.0, 1.0))
+    assert clock.settled
+    clock.reset()
+    assert (clock.settled, clock.uncertainty) == (False, None)
+
+
+def test_a_quick_exchange_is_forgotten_when_crystals_have_parted() -> None:
+    clock = known(exchange(9000, 0.2, 0.4))
+    for i in range(KEPT - 1):
+        clock.add(exchange(10_000 + 1000 * i, 3.0, 9.0))
+    assert clock.uncertainty == 0.0003
+    clock.add(exchange(99_000, 3.0, 9.0))
+    assert clock.uncertainty == 0.006
 
 
 @pytest.mark.parametrize('seconds', [0.3, 1.5])

@@ -60,12 +60,15 @@ def test_a_vehicle_without_couplings_is_told_so(options, tmp_path, monkeypatch, 
 def test_the_coupling_that_is_asked_for_is_reduced(tmp_path, monkeypatch):
     asked = []
 
-    def propose(_setting, target, _shown):
-        asked.append(target)
+    def propose(setting, target, _shown):
+        first = setting.space.parameters[0]
+        asked.append((target, first.name, first.lower, first.upper))
         raise FailedError('enough')
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(search, 'propose', propose)
     with pytest.raises(SystemExit):
-        main.main(['design', 'rexrov', '--reduce', 'delta_pi.pitch'])
-    assert asked == ['delta_pi.pitch']
+        main.main(
+            ['design', 'rexrov', '--reduce', 'delta_pi.pitch', '--bound', 'shift.x=-0.02:0.05']
+        )
+    assert asked == [('delta_pi.pitch', 'shift.x', -0.02, 0.05)]

@@ -40,7 +40,10 @@ def test_a_vehicle_that_diverges_says_why_it_has_no_peaks(monkeypatch) -> None:
 
     monkeypatch.setattr(atlas, 'simulate', diverges)
     reason = {'failure': 'gvc diverges at 0.1 s', 'scenario': 'case1_rexrov'}
-    assert atlas.reached('rexrov') == reason
+    (chart,) = charts(['rexrov'])
+    assert chart.reached == reason
+    rows = results_of([chart]).tables['atlas'].records()
+    assert [row[key] for row in rows for key in row if key.startswith('case1_')] == [None] * 3 * 36
 
 
 def test_peaks_are_those_of_the_scaled_scenario(found) -> None:
@@ -120,5 +123,5 @@ def test_a_vehicle_is_shown_beside_all_that_are_shipped(tmp_path: Path, monkeypa
 
     monkeypatch.setattr(atlas, 'charts', asks)
     with pytest.raises(SystemExit):
-        main.main(['atlas', 'rexrov', str(mine), '--out', str(tmp_path / 'out')])
+        main.main(['atlas', 'rexrov', str(mine), str(mine), '--out', str(tmp_path / 'out')])
     assert asked == [*shipped_names('vehicles'), str(mine)]

@@ -80,6 +80,14 @@ def test_an_atlas(tmp_path) -> None:
         assert words.count(plotting.ALWAYS) == 2, 'one of each vehicle that did not diverge'
 
 
+def test_shares_however_small_are_on_a_scale_of_a_decade() -> None:
+    chart = _chart('weak', 1)
+    chart.couplings.velocity_shares *= 1e-7
+    chart.couplings.input_shares *= 1e-7
+    figure, *_ = atlas._shares([chart])
+    assert figure.axes[0].images[0].get_clim() == (0.001, 0.01)
+
+
 def test_an_atlas_of_vehicles_that_nothing_couples(tmp_path) -> None:
     with artists.captured() as figures:
         atlas.draw([_chart('flat', 2, diagonal=True), _chart('round', 3, diagonal=True)], tmp_path)

@@ -71,7 +71,8 @@ def test_ranks_are_by_value_and_what_never_settles_is_last(entries, table) -> No
     for run, settled in zip(ranking.runs, ranking.ranks[:, names.index(SETTLED)], strict=True):
         assert (rows[run][SETTLED] is None) == run.endswith('/cl')
         assert settled == 3.5 if run.endswith('/cl') else settled < 3
-    assert list(ranking.mean_rank) == sorted(ranking.mean_rank)
+    mean = np.nanmean(ranking.ranks, axis=1).tolist()
+    assert mean == sorted(mean)
 
 
 def test_ranks_and_ratios_by_hand() -> None:
@@ -87,7 +88,7 @@ def test_ranks_and_ratios_by_hand() -> None:
         **{m.name: [*known.get(m.name, [7.0] * 5), None] for m in MEASURES},
     })  # fmt: skip
     found, nan = rank(table), np.nan
-    assert list(found.runs) == ['c', 'd', 'b', 'a', 'free']
+    assert list(found.runs) == ['c', 'd', 'b', 'a', 'free']  # of 5.5, 7.5, 8, 9, 15 thirds
     ranks, ratios = (
         {m.name: dict(zip(found.runs, column, strict=True))
          for m, column in zip(found.measures, columns.T, strict=True)}
@@ -102,7 +103,6 @@ def test_ranks_and_ratios_by_hand() -> None:
     assert not ranks
     of = ratios['kinetic_energy.mean']
     np.testing.assert_array_equal([of[r] for r in (*'abcd', 'free')], [1, -1, 0, nan, nan])
-    np.testing.assert_allclose(found.mean_rank, [5.5 / 3, 7.5 / 3, 8 / 3, 3, 5])
 
 
 def test_the_table_that_is_written_has_each_rank_beside_its_run(table, tmp_path: Path) -> None:
@@ -187,6 +187,25 @@ def test_a_grid_of_panels_is_drawn_of_twelve_scenarios_at_most(entries) -> None:
     assert 0.0 <= left.min() < np.log10(2.0), 'in colour down to the band'
 
 
+def test_rows_last_from_the_first_sample_to_the_end_of_the_longest_run() -> None:
+    def run(*times: float) -> Made:
+        line, peak = (np.array(times), 0.005 * np.array([4.0, 2.0, 1.0])), Made(peak=np.zeros(6))
+        return Made(knows_setpoint=True, line=lambda *_: line, part=lambda _: peak)
+
+    runs = [run(0.2, 1.0, 4.0), run(0.1, 1.0, 2.0), run(0.2, 1.0, 8.0), *[run(0.2, 1, 3)] * 6]
+    free = Entry('s/free', 's', 'v', 'cl', 'cl', '', {}, Made(knows_setpoint=False))
+    nine = [Entry(f's/{k}', 's', 'v', 'cl', 'cl', '', {}, one) for k, one in enumerate(runs)]
+    assert 'falls below the dotted 1' in plots.errors([free, *nine[:8]])[2]
+    figure, _, caption = plots.errors([free, *nine])
+    assert 'Each row is a run' in caption
+    (mesh,) = figure.axes[0].collections
+    x = mesh.get_coordinates()[0, :, 0]
+    assert (x[0], x[-1]) == pytest.approx((0.1, 8.0))
+    hidden = np.ma.getmaskarray(mesh.get_array()).reshape(9, -1)
+    times = np.geomspace(0.1, 8.0, hidden.shape[1])
+    np.testing.assert_array_equal(hidden[:4], times > np.array([[4.0], [2.0], [9.0], [3.0]]))
+
+
 def test_a_line_ends_where_its_error_is_zero() -> None:
     run = simulate(SHORT, 'gvc')
     nu = np.where(run.t[:, None] > 3.0, run.nu_d, run.nu)
@@ -212,8 +231,9 @@ def test_ranks_are_lines_as_long_as_these_can_be_told_apart(entries, count, line
 def test_colours_of_a_ranking_end_at_sixteen_times_the_median(entries) -> None:
     many = [replace(entries[i % 2], name=f'{i}') for i in range(9)]
     ranking = rank(comparison_table(many))
-    for times, end in ((100.0, 4.0), (1e-6, 1.0)):
-        far = replace(ranking, ratios=times * ranking.ratios)
+    largest = np.nanmax(np.abs(ranking.ratios))
+    for widest, end in ((100.0, 4.0), (1.25, 2.0), (1e-6, 1.0)):
+        far = replace(ranking, ratios=widest / largest * ranking.ratios)
         assert plots._ranking(far)[0].axes[0].images[0].get_clim() == (-end, end)
 
 

@@ -24,9 +24,9 @@ def scenarios(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     names = {'one': 0.4, 'two': 0.2, 'wild': 0.4}
     for name, duration in names.items():
         data = SCENARIO.data | {'name': name, 'duration': duration, 'vehicle': 'lauv'}
-        data['controllers'] = dict(data['controllers'])
+        gvc, cl = data['controllers'].values()
         if name == 'wild':
-            data['controllers']['cl'] = data['controllers']['cl'] | {'k_D': 1e9}
+            data['controllers'] = {'calm': gvc, 'stiff': cl | {'k_D': 1e9}}
         (tmp_path / f'{name}.yaml').write_text(yaml.safe_dump(data, sort_keys=False))
     return [f'{name}.yaml' for name in names]
 
@@ -36,8 +36,9 @@ def test_command_compares_scenarios_by_name(scenarios, capsys) -> None:
     main.main(['analyze', *scenarios, '--json'])
     captured = capsys.readouterr()
     summaries = json.loads(captured.out)
-    assert list(summaries) == ['one/gvc', 'one/cl', 'two/gvc', 'two/cl', 'wild/gvc', 'wild/cl']
-    assert summaries['wild/cl'] is None
+    assert list(summaries) == ['one/gvc', 'one/cl', 'two/gvc', 'two/cl',
+                               'wild/calm', 'wild/stiff']  # fmt: skip
+    assert summaries['wild/stiff'] is None
     assert summaries['one/gvc'] == summarize(simulate(load_scenario('one.yaml'), 'gvc'))
     out = Path('runs/analyze_one_two_wild')
     assert json.loads((out / 'summary.json').read_text()) == summaries
@@ -46,11 +47,11 @@ def test_command_compares_scenarios_by_name(scenarios, capsys) -> None:
     assert float(rows[2]['duration']) == 0.2
     report = unescape((out / 'report.html').read_text(encoding='utf-8')).replace('\xa0', ' ')
     assert 'Durations differ: 0.4 s (3 runs) and 0.2 s (2 runs)' in report
-    assert '1 of 6 runs failed and have no figures: wild/cl.' in report
+    assert '1 of 6 runs failed and have no figures: wild/stiff.' in report
     *notes, failed = [line for line in captured.err.splitlines() if line.startswith('note: ')]
     assert notes == [f'note: {n}: {note}' for n, one in summaries.items() if one
                      for note in one['notes']]  # fmt: skip
-    assert 'wild/cl' in failed
+    assert 'wild/stiff' in failed
     assert 'diverges' in failed
 
 
@@ -68,15 +69,17 @@ def test_all_diverged_is_a_failure(scenarios, capsys, monkeypatch) -> None:
     from auv_analysis.simulation.simulate import DivergedError
     from auv_analysis.studies.compare import report as compare
 
+    reasons = iter('abcdef')
+
     def diverge(*_):
-        raise DivergedError('it diverges')
+        raise DivergedError(f'it diverges {next(reasons)}')
 
     monkeypatch.setattr(compare, 'open_source', diverge)
     with pytest.raises(SystemExit) as end:
         main.main(['analyze', *scenarios])
     assert end.value.code == 1
     assert (
-        capsys.readouterr().err.splitlines()[-1] == 'all of 6 runs failed, the first: it diverges'
+        capsys.readouterr().err.splitlines()[-1] == 'all of 6 runs failed, the first: it diverges a'
     )
     assert not Path('runs').exists()
 

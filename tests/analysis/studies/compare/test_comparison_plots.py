@@ -293,6 +293,14 @@ def _row(run: str, settled: float | None, **about) -> dict:
     }  # fmt: skip
 
 
+def test_runs_of_one_name_and_other_set_points_are_told_of(few) -> None:
+    told = [sentence.text for sentence in findings(few, [])]
+    assert told == [
+        f'Not all 2 runs of {name} have the same set-point: only the name is the same.'
+        for name in 'ab'
+    ]
+
+
 def said(*rows) -> list[str]:
     return [sentence.text for sentence in findings([], rows)]
 

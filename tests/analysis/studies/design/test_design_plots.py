@@ -36,7 +36,7 @@ def _designed():
     phases = {
         name: Made(runs={'gvc': run, 'cl': made('cl', 'cl', 9)}) for name, run in runs.items()
     }
-    return Made(document=document, proposal=vehicle, **phases), runs, upper
+    return Made(document=document, proposal=vehicle, simulated=phases), runs, upper
 
 
 def test_what_begins_with_a_peak_is_drawn_in_two_phases(tmp_path) -> None:

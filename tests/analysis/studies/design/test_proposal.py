@@ -15,7 +15,13 @@ from auv_analysis.studies.design import results, search
 from auv_analysis.studies.design import setting as setting_of
 from auv_analysis.studies.design.change import ALL, NAMES, Parameter, semi_axes
 from auv_analysis.studies.design.prediction import COUPLINGS, Objective, coupling_named
-from auv_analysis.studies.design.report import _findings, change, print_design, write_report
+from auv_analysis.studies.design.report import (
+    _findings,
+    _sections,
+    change,
+    print_design,
+    write_report,
+)
 from auv_analysis.studies.design.results import (
     bound_warnings,
     place_warnings,
@@ -455,7 +461,16 @@ def test_the_report_and_its_numbers(short, tmp_path, capsys, approved):
     print_design(document)
     printed = capsys.readouterr().out
     assert document['statement'] in printed
-    assert 'delta_pi_max.pitch' in printed
+    approved.add(printed.splitlines())
+    firm = document['controllers']['firm']
+    result.document['controllers'] = {
+        'firm': firm, 'soft': {'measures': [], 'failure': 'it diverges'}
+    }  # fmt: skip
+    _, effect, *_ = _sections(result, dict.fromkeys(('Upsilon', 'couplings', 'reduced')))
+    *shown, failure = effect.blocks
+    assert ([one and one.name for one in shown], failure) == (
+        [None, 'ranking', None, 'measures'], 'Under soft: it diverges.'
+    )  # fmt: skip
 
 
 def test_a_vehicle_that_rights_itself_less_is_warned_of(approved):

@@ -56,9 +56,10 @@ def coupled(charts: Sequence[Chart]) -> list[tuple[str, Chart]]:
         if chart.couplings.is_diagonal:
             continue
         R = chart.couplings.correlation
-        same = [names for names, other in found if np.array_equal(other.couplings.correlation, R)]
-        if same:
-            same[0].append(chart.name)
+        for names, other in found:
+            if np.array_equal(other.couplings.correlation, R):
+                names.append(chart.name)
+                break
         else:
             found.append(([chart.name], chart))
     return [(', '.join(names), chart) for names, chart in found]
@@ -100,8 +101,8 @@ def _shares(charts: Sequence[Chart]) -> Drawn:
     for name, chart in coupled(charts):
         both = chart.couplings.velocity_shares + chart.couplings.input_shares
         values[name] = 100 * np.where(np.eye(6), np.nan, both)
-    largest = max((np.nanmax(cells) for cells in values.values()), default=1.0)
-    scale = LogNorm(SMALLEST_SHARE, max(largest, 10 * SMALLEST_SHARE), clip=True)
+    largest = max([10 * SMALLEST_SHARE, *map(np.nanmax, values.values())])
+    scale = LogNorm(SMALLEST_SHARE, largest, clip=True)
     grids = {
         name: HeatMap(cells, DOFS, 'share of energy (%)', 'cividis_r', scale)
         for name, cells in values.items()

@@ -130,7 +130,7 @@ def _ranking(ranking: Ranking) -> Drawn:
     widest = float(np.nanmax(np.abs(ranking.ratios), initial=1.0))
     end = min(np.ceil(widest), 4.0)
     grid = HeatMap(
-        np.where(np.isfinite(ranking.ratios), ranking.ratios + 0.0, np.nan),
+        ranking.ratios,
         labels,
         'log2 of value / median of the runs',
         'PuOr_r',

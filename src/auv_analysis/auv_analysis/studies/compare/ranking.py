@@ -25,20 +25,16 @@ class Ranking:
     ----------
     runs : names (n,)
     measures : those that differ between the runs (m,)
-    values : (n, m), NaN where a run has none
     ranks : (n, m), 1 for the smallest, equal values share one; NaN where there is no value, but
         what does not settle comes last
     ratios : (n, m) log2 of value / median of the positive ones; NaN where there is none or zero
-    mean_rank : (n,)
 
     """
 
     runs: Sequence[str]
     measures: Sequence[Measure]
-    values: np.ndarray
     ranks: np.ndarray
     ratios: np.ndarray
-    mean_rank: np.ndarray
 
 
 def rank(table: pa.Table) -> Ranking:
@@ -58,16 +54,9 @@ def rank(table: pa.Table) -> Ranking:
         if measures
         else np.zeros((len(values), 0))
     )
-    mean = np.nanmean(ranks, axis=1) if measures else np.arange(len(values), dtype=float)
+    mean = np.nanmean(ranks, axis=1) if measures else np.arange(len(values))
     order = np.argsort(mean, kind='stable')
-    return Ranking(
-        names[there][order].tolist(),
-        measures,
-        values[order],
-        ranks[order],
-        _ratios(values)[order],
-        mean[order],
-    )
+    return Ranking(names[there][order].tolist(), measures, ranks[order], _ratios(values)[order])
 
 
 def _ranks(values: np.ndarray, measure: Measure, tracks: np.ndarray) -> np.ndarray:
@@ -83,7 +72,7 @@ def _ranks(values: np.ndarray, measure: Measure, tracks: np.ndarray) -> np.ndarr
 
 def _ratios(values: np.ndarray) -> np.ndarray:
     positive = np.where(values > 0, values, np.nan)
-    return np.log2(positive / np.nanmedian(positive, axis=0)) if len(values) else values
+    return np.log2(positive / np.nanmedian(positive, axis=0))
 
 
 TABLE, CSV = 'comparison.parquet', 'comparison.csv'

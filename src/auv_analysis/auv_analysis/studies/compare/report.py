@@ -92,9 +92,7 @@ def _entry(source: RunSource, vehicle: str | None) -> Entry:
     return Entry('', *names, origin, summarize(run), digest(run))
 
 
-def conclude_comparison(
-    out: Path, entries: Sequence[Entry], *, report: bool = True
-) -> dict[str, Any]:
+def conclude_comparison(out: Path, entries: Sequence[Entry], *, report: bool) -> dict[str, Any]:
     """Write summary.json, table, plots and report.
 
     Parameters

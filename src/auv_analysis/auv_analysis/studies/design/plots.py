@@ -29,10 +29,10 @@ def draw_design(result: DesignStudy, folder: Path) -> dict[str, FigureRecord]:
     folder : where the files go; made when it is not there
 
     """
-    if result.before is None or result.after is None:
+    if not result.simulated:
         return {}
     main = result.document['controller']
-    lines = digests({'before': result.before.runs[main], 'after': result.after.runs[main]})
+    lines = digests({name: one.runs[main] for name, one in result.simulated.items()})
     parts = {
         'couplings': partial(_couplings, result.document),
         'reduced': partial(_reduced, result.document, lines),
@@ -70,7 +70,7 @@ def _couplings(document: Mapping[str, Any]) -> Drawn:
 def _reduced(document: Mapping[str, Any], lines: Mapping[str, RunDigest]) -> Drawn:
     main, (kind, dof) = document['controller'], document['reduce'].split('.')
     column = DOFS.index(dof)
-    split = all((kind, 'early') in run.traces for run in lines.values())
+    split = (kind, 'early') in lines['before'].traces  # which last as long
     parts = ('early', 'late') if split else ('whole',)
     unit = next(row['unit'] for row in document['measures'] if row['name'] == f'{kind}_max.{dof}')
 
@@ -102,7 +102,7 @@ def _upsilon(document: Mapping[str, Any], M: np.ndarray) -> Drawn:
     grid = figure.subplots(1, 2)
     for i, (axes, (key, U)) in enumerate(zip(grid, pair.items(), strict=True)):
         axes.imshow(sizes[key], cmap='Blues', vmin=0.0, vmax=top)
-        for row, column in zip(*np.nonzero(np.triu(np.abs(sizes[key]) > 1e-12)), strict=True):
+        for row, column in np.argwhere(sizes[key] > 1e-12):
             dark = sizes[key][row, column] > 0.6 * top
             text = f'{U[row, column]:.2g}'.replace('-', '−')
             colour = 'white' if dark else 'black'

@@ -211,15 +211,19 @@ def matrix_table(results: Results) -> Table:
     """What the best change of each part leaves of each coupling."""
     alternatives = results.facts['alternatives']
     parts = list(dict.fromkeys(one['part'] for one in alternatives))
-    found: dict[str, dict[str, Any]] = {}
-    least: dict[tuple[str, str], float] = {}
-    for i, one in enumerate(alternatives):
-        coupling, part, ratio = one['coupling'], one['part'], one['ratio']
-        row = found.setdefault(coupling, {'coupling': coupling})
-        if ratio is not None and ratio < least.get((coupling, part), float('inf')):
-            least[coupling, part] = ratio
-            row |= {part: ('alternatives', i, 'ratio')}
-            row |= {f'kind {part}': 'good' if ratio <= HALF else ''}
+    rows: list[dict[str, Any]] = []
+    for coupling in dict.fromkeys(one['coupling'] for one in alternatives):
+        row: dict[str, Any] = {'coupling': coupling} | {f'kind {part}': '' for part in parts}
+        for part in parts:
+            left = [
+                (one['ratio'], i) for i, one in enumerate(alternatives)
+                if (one['coupling'], one['part']) == (coupling, part) and one['ratio'] is not None
+            ]  # fmt: skip
+            if left:
+                ratio, i = min(left)
+                row |= {part: ('alternatives', i, 'ratio')}
+                row |= {f'kind {part}': 'good' if ratio <= HALF else ''}
+        rows.append(row)
     shown: dict[str, Shown] = {
         'coupling': described('', 'coupling that the change was made for'),
         **{
@@ -230,7 +234,6 @@ def matrix_table(results: Results) -> Table:
             for part in parts
         },
     }  # fmt: skip
-    rows = [{f'kind {part}': '' for part in parts} | row for row in found.values()]
     caption = (
         'Which change removes which coupling: what the best change of each kind, made for that '
         'coupling alone, leaves of it. Every entry was simulated with its own vehicle.'
@@ -327,7 +330,7 @@ def change(before: float | None, after: float | None) -> str:
     """Change in per cent as text; a dash where there is none to speak of."""
     if before is None or after is None:
         return ''
-    if abs(after - before) <= NEAR * max(abs(before), abs(after)):
+    if abs(after - before) <= NEAR * abs(before):
         return '='
     if before == 0:
         return 'new'

@@ -142,14 +142,13 @@ class DesignStudy:
     ----------
     proposal : what was found
     document : what `--json` prints
-    before, after : runs of every controller; None where there is nothing to reduce
+    simulated : 'before', 'after' -> runs of every controller; {} where there is nothing to reduce
 
     """
 
     proposal: Proposal
     document: dict[str, Any]
-    before: Simulated | None = None
-    after: Simulated | None = None
+    simulated: Mapping[str, Simulated]
 
 
 def write_results(found: Proposal, results: ResultsFolder) -> DesignStudy:
@@ -174,14 +173,14 @@ def write_results(found: Proposal, results: ResultsFolder) -> DesignStudy:
         name = setting.space.vehicle.name
         document['statement'] = nothing_statement(name, found.asked, found.there)
         write_json(out / DESIGN, document)
-        return DesignStudy(found, document)
+        return DesignStudy(found, document, {})
     before = Simulated.of(setting.scenario, setting.hold)
     after = Simulated.of(scenario, setting.hold)
     write_json(out / BEFORE, before.summaries)
     write_json(out / AFTER, after.summaries)
     document |= _body(found, scenario.vehicle, before, after)
     write_json(out / DESIGN, document)
-    return DesignStudy(found, document, before, after)
+    return DesignStudy(found, document, {'before': before, 'after': after})
 
 
 def _head(found: Proposal, out: Path) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
+import numpy as np
 import pytest
 from geometry_msgs.msg import WrenchStamped
 from helpers import faulty_drivers
@@ -16,6 +17,7 @@ from helpers.patience import patience
 from helpers.stalls import undisturbed
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.serialization import serialize_message
 
 from auv_analysis.cli.main import main
 from auv_analysis.driver.checks import PASSIVE, judge, refusal
@@ -223,6 +225,16 @@ def test_what_was_applied_is_heard_by_who_commands() -> None:
         log = client.log(0)
         assert log.clock_ns[0] == 7
         assert log.applied_arrived_ns[0] <= log.clock_arrived_ns[0] <= log.ended_ns
+        take = {one.topic_name: one.callback for one in client._node.data_subscriptions()}
+        odom = bytes(serialize_message(convert.odometry(1, np.eye(13)[3], Frames())))
+        broken = b'\0\1\0\0\7'
+        for topic, data, number in (
+            ('/odom', odom, 3), ('/odom', broken, 4), ('/odom', odom, 5),
+            ('/wrench_applied', broken, 9), ('/odom', odom, 6),
+        ):  # fmt: skip
+            take[topic](data, {'publication_sequence_number': number})
+        assert client.log(0).lost == 0
+        assert client.log(0).unreadable == {'/odom': 1, 'wrench_applied': 1}
     finally:
         client.close()
         peer.close()

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import os
 import subprocess
 import sys
 import threading
@@ -16,6 +17,7 @@ from rclpy.duration import Duration
 from rclpy.service import Service
 
 from auv_dynamics.ros import convert, node_interface, node_main, topics
+from auv_dynamics.ros.interface import PARENT
 from auv_dynamics.ros.node_main import BulkNode
 
 
@@ -56,9 +58,17 @@ def test_a_teardown_without_end_does_not_change_the_exit_code(code: int) -> None
     assert (ended.returncode, ended.stdout) == (code, 'said\n')
 
 
-def test_all_that_has_arrived_before_the_end_is_taken() -> None:
+@pytest.mark.parametrize('orphaned', [False, True])
+def test_all_that_has_arrived_before_the_end_is_taken(monkeypatch, orphaned: bool) -> None:
+    """That of `auv run`, by which it was started, is its end as well."""
+    monkeypatch.setenv(PARENT, str(os.getppid()))
+    assert not node_main._orphaned()
     stop, taken = threading.Event(), []
-    stop.set()
+    if orphaned:
+        monkeypatch.setenv(PARENT, str(os.getpid()))
+    else:
+        stop.set()
+    guard = threading.Timer(patience(30.0), stop.set)
     with program() as made:
         node = made.add(Made, {'lockstep': False})
         node.create_subscription(topics.WRENCH.type, 'late', taken.append, topics.every_step())
@@ -67,7 +77,10 @@ def test_all_that_has_arrived_before_the_end_is_taken() -> None:
         for _ in range(30):
             says.publish(topics.WRENCH.type())
         assert says.wait_for_all_acked(Duration(seconds=patience(30.0)))
+        guard.start()
         node_main._spin([node], made.executor, stop)
+        guard.cancel()
+        assert stop.is_set() != orphaned
         assert len(taken) == 30
 
 
@@ -75,25 +88,26 @@ def test_in_lock_step_the_time_of_a_node_is_the_newest_that_is_simulated() -> No
     stop, looks = threading.Event(), itertools.count()
     with program() as made:
         node = made.add(Made, {'lockstep': True, 'use_sim_time': True})
-        clock = made.node.create_publisher(topics.CLOCK.type, topics.CLOCK.name, 10)
-        made.until(clock.get_subscription_count)
+        node.bulk = True  # nobody else takes what arrives
+        made.listen(topics.CLOCK)
+        for ns in (3, 8):
+            made.publish(topics.CLOCK, topics.CLOCK.type(clock=convert.stamp(ns)), subscribers=2)
+        made.until(lambda: len(made.heard[topics.CLOCK.name]) == 2)
 
         def look() -> None:
             if node.get_clock().now().nanoseconds == 8 or next(looks) > patience(1000.0):
                 stop.set()
 
         node_interface.steady_timer(node, 0.01, look)
-        for ns in (3, 8):
-            clock.publish(topics.CLOCK.type(clock=convert.stamp(ns)))
         node_main._spin([node], made.executor, stop)
         assert node.get_clock().now().nanoseconds == 8
 
 
-def serving(*failing: Any) -> SimpleNamespace:
-    """An executor that never runs out of callbacks; those of these entities raise ValueError."""
+def serving(entity: Any = None) -> SimpleNamespace:
+    """An executor that never runs out of callbacks; those of an entity raise ValueError."""
 
     def result() -> None:
-        if failing:
+        if entity is not None:
             raise ValueError('no number')
 
     def callback() -> None:
@@ -103,7 +117,7 @@ def serving(*failing: Any) -> SimpleNamespace:
     calls: list[int] = []
     logger = SimpleNamespace(error=calls.append)
     node = SimpleNamespace(get_logger=lambda: logger)
-    ready = callback, failing[0] if failing else None, node
+    ready = callback, entity, node
     return SimpleNamespace(calls=calls, wait_for_ready_callbacks=lambda timeout_sec: ready)
 
 

@@ -341,7 +341,9 @@ def test_a_long_step_is_not_late(made, hours, capfd) -> None:
     hours.go_on(1.0)
     made.until(lambda: len(made.heard['odom']) == 2, 'step 1')
     made.spin(0.1)
-    assert ' s late' not in capfd.readouterr().err
+    said = capfd.readouterr().err
+    assert ' s late' not in said
+    assert 'simulates herman2018 in real time, 1 s per step' in said
 
 
 def test_a_wrench_is_of_a_step_up_to_a_second_ahead_and_ends_a_silence(made, hours, capfd) -> None:

@@ -144,7 +144,7 @@ class BulkMixin:
         """Tell rclpy's clock the newest simulated time."""
         mine = super().subscriptions  # type: ignore[misc]  # as above
         for subscription in [s for s in mine if _is_clock(s)]:
-            for newest, _ in taken(subscription, DEPTH)[-1:]:
+            for newest, _ in taken(subscription, 1):  # rclpy keeps no more
                 subscription.callback(newest)
 
 

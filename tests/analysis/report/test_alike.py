@@ -7,8 +7,10 @@ from types import SimpleNamespace as Made
 import numpy as np
 import pytest
 from helpers import made_runs
+from helpers.block_runs import in_blocks
 
 from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.output.text import fixed
 from auv_analysis.report import digest as digesting
 from auv_analysis.report.digest import alike, digests
 from auv_analysis.report.results import Table
@@ -52,6 +54,7 @@ def test_runs_of_other_names_may_have_the_same_set_point(run) -> None:
     assert 'with the same start, set-point and disturbance.' in text
     assert 'for the same set-point these places are up to' in text
     assert 'only the name' not in text
+    assert 'not shown' not in text, 'none is'
 
 
 def test_another_start_is_not_laid_to_the_laws(run) -> None:
@@ -67,6 +70,12 @@ def test_set_points_are_held_against_each_other_over_the_time_that_runs_share(ru
     assert alike([a, *digests({'b': late}).values()], 'nu_d') is False
 
 
+def test_runs_that_begin_at_other_times_are_held_against_each_other_from_their_starts(run) -> None:
+    short = run.part(slice(0, 150))  # few times have no rounding
+    later = replace(short, t=short.t + 1234.567)
+    assert alike([*digests({'a': short, 'b': later}).values()], 'F') is True
+
+
 def test_what_is_not_known_is_neither_the_same_nor_another(run) -> None:
     blind = replace(run, disturbance=None)
     shifted = replace(run, t=run.t * 1.000123)
@@ -75,10 +84,12 @@ def test_what_is_not_known_is_neither_the_same_nor_another(run) -> None:
     assert alike([a, c], 'nu_d') is None
 
 
-def test_a_band_is_drawn_only_where_the_runs_share_it(run, other) -> None:
-    changed = replace(run, nu_d=run.nu_d * [1.5, 1, 1, 1, 1, 1])
-    bands = common_bands(digests({'a': run, 'b': changed}))
-    assert [band is None for band in bands] == [True, *5 * [False]]
+def test_a_band_is_drawn_only_where_the_runs_share_it() -> None:
+    run = made_runs.made('gvc', 'gvc', 1)
+    one = replace(run, nu_d=run.nu_d * [1, 1, 1, 1, 1, np.nan])
+    other = replace(run, nu_d=run.nu_d * [1.5, 1 + 5e-7, 1 + 2e-6, 1, 1, np.nan])
+    bands = common_bands(digests({'a': one, 'b': other}))
+    assert [band is None for band in bands] == [True, False, True, False, False, False]
 
 
 @pytest.mark.parametrize('measured', [True, False])
@@ -94,8 +105,9 @@ def test_noise_above_the_band_is_called_so_where_the_velocity_was_measured(run, 
 def test_settled_is_the_last_time_of_a_large_error_unless_it_is_too_late(last, settled) -> None:
     run = made_runs.made('gvc', 'gvc', 1)
     error = np.zeros_like(run.nu)
-    error[last, 4] = 0.02
-    found = digests({'gvc': replace(run, nu=run.nu_d - error, faults=())})['gvc']
+    error[last, 4], error[last + 1 :, 1] = -0.0051, 0.0049
+    run = replace(run, nu=run.nu_d - error, faults=())
+    found = digests({'gvc': in_blocks(run, 37)})['gvc']
     assert found.settled == pytest.approx(settled)
 
 
@@ -125,12 +137,20 @@ def test_errors_after_two_seconds_are_told_of_runs_that_are_longer(run) -> None:
 
 
 def test_an_end_is_told_where_the_position_is_known(run) -> None:
-    lost = np.where(np.arange(6) < 3, np.nan, run.eta)
-    nowhere, turned, there = (
+    lost, deep = (np.where(np.arange(6) < n, np.nan, run.eta) for n in (3, 2))
+    nowhere, turned, submerged, there = (
         re.sub(' at 0x[0-9a-f]+', '', said({'a': replace(run, eta=eta)}))
-        for eta in (np.nan * lost, lost, run.eta)
+        for eta in (np.nan * lost, lost, deep, run.eta)
     )
     assert nowhere == turned != there
+    assert f'(–, –, {fixed(run.eta[-1, 2], 2)}) m under a' in submerged
+
+
+def test_a_start_that_is_not_known_is_neither_the_same_nor_another(run) -> None:
+    lost = replace(run, eta=np.where(np.arange(6) < 2, np.nan, run.eta))
+    assert 'with the same set-point and disturbance.' in said({'a': lost, 'b': lost})
+    other = replace(lost, eta=lost.eta + 1.0)
+    assert 'disturbance, but not with the same start.' in said({'a': lost, 'b': other})
 
 
 def test_disturbances_are_shared_where_the_faults_are_too(run) -> None:
@@ -140,7 +160,11 @@ def test_disturbances_are_shared_where_the_faults_are_too(run) -> None:
                   for name, told in (('a', {'thruster': 1}), ('b', faults))}  # fmt: skip
         report = SectionInputs(drawn, {}, scenes, [], {})
         same.append(report._share_disturbances([*drawn.values()]))
+        heavier = replace(drawn['b'], vehicle=run.vehicle.changed(M=1.1 * run.vehicle.M))
+        assert not report._share_disturbances([drawn['a'], heavier])
     assert same == [True, False]
+    untold = {('a',): SetUp('', [], None, {'name': 'calm'}), ('b',): SetUp('', [], None)}
+    assert not SectionInputs(drawn, {}, untold, [], {})._share_disturbances([*drawn.values()])
 
 
 def test_ten_samples_at_equal_times_are_enough_to_compare() -> None:
@@ -149,3 +173,14 @@ def test_ten_samples_at_equal_times_are_enough_to_compare() -> None:
         later = t + 0.5 * (t >= shared)
         runs = [Made(course={'t': times, 'nu_d': nu_d}) for times in (t, later)]
         assert alike(runs, 'nu_d') is known
+
+
+@pytest.mark.parametrize(
+    ('apart', 'same'),
+    [([9e-4, -9e-10], True), ([-1.1e-3, 0.0], False), ([0.0, -1.1e-9], False)],
+)
+def test_what_is_apart_by_rounding_is_alike(apart: list[float], same: bool) -> None:
+    """A signal with a peak of 1000, and one that is zero; one run has three samples."""
+    few, many = (np.outer(np.arange(n), [-500.0, 0.0]) for n in (3, 30))
+    runs = [Made(course={'t': np.arange(len(F)), 'F': F}) for F in (few, many + apart)]
+    assert alike(runs, 'F') is alike(runs[::-1], 'F') is same

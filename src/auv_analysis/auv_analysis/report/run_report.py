@@ -179,8 +179,9 @@ class SectionInputs:
         runs = list(self.runs.values())
         if len(runs) < 2:
             return [], []
+        apart = np.ptp([run.begin for run in runs], axis=0)
         alike_in = {
-            'start': bool(np.ptp([run.begin for run in runs], axis=0).max() <= TINY),
+            'start': False if np.any(apart > TINY) else None if np.isnan(apart).any() else True,
             'set-point': alike(runs, 'nu_d'),
             'disturbance': True if self._share_disturbances(runs) else alike(runs, 'F'),
         }

@@ -41,7 +41,6 @@ SHOWN = {
 def results_fixture() -> Results:
     results = Results('study', {'seed': 7})
     results.add('draws', 'What was drawn.', ROWS, SHOWN)
-    results.add('listed', 'What is listed.', ROWS, SHOWN, file='')
     return results
 
 
@@ -49,9 +48,7 @@ def test_results_are_written_once_with_unknown_as_null(results: Results, tmp_pat
     paths = results.write(tmp_path)
     assert [path.name for path in paths] == ['study.json', 'draws.parquet']
     document = json.loads(paths[0].read_text())
-    assert document['seed'] == 7
-    assert document['listed'][1]['share'] is None
-    assert 'draws' not in document
+    assert document == {'seed': 7}
     table = parquet.read_table(paths[1])
     assert table.to_pylist()[0] == ROWS[0]
     assert table['share'].null_count == 1
@@ -70,25 +67,22 @@ def test_all_that_is_known_of_a_quantity_is_stored_beside_its_column() -> None:
 
 
 def test_columns_are_stored_in_the_order_in_which_they_are_shown() -> None:
-    table = make_table('t', 'All.', [{'c': 3, 'b': 2, 'a': 1}], ['a', 'b'])
+    table = make_table('t', 'All.', [{'c': 3, 'b': 2, 'a': None}], ['a', 'b'])
     assert table.data.column_names == ['a', 'b', 'c']
+    assert [head.numeric for head in table.columns] == [True, True], 'unknown, but numbers'
 
 
 def test_every_pointer_leads_to_the_number_that_is_shown(results: Results, tmp_path: Path) -> None:
     paths = results.write(tmp_path)
-    document, table = json.loads(paths[0].read_text()), parquet.read_table(paths[1]).to_pylist()
+    table = parquet.read_table(paths[1]).to_pylist()
     shown = [*numbers_of(results.tables.values())]
-    assert len(shown) == 8
+    assert len(shown) == 4
     for row in shown:
         file, _, place = row['source'].partition(':')
         place, _, factor = place.partition('*')
-        if file == 'study.json':
-            _, name, index, column = place.split('/')
-            value = document[name][int(index)][column]
-        else:
-            column, _, index = place.removesuffix(']').partition('[')
-            value = table[int(index)][column]
-        assert value * float(factor or 1) == row['value']
+        column, _, index = place.removesuffix(']').partition('[')
+        assert file == 'draws.parquet'
+        assert table[int(index)][column] * float(factor or 1) == row['value']
 
 
 def test_a_share_is_shown_in_percent_with_its_verdict(results: Results) -> None:
@@ -130,6 +124,8 @@ def test_each_look_of_a_cell() -> None:
     assert [cell.kind for cell in (whole, none, far, bad)] == ['', 'zero', '', 'bad']
     assert [head.meaning for head in table.meanings] == ['it']
     assert table.heads == [('', 8), ('not', 1)]
+    plain = make_table('t', 'T.', [{'word': 'w', 'how': None}], {'word': Column('w', kind='how')})
+    assert plain.rows[0][0].kind == '', 'not known'
 
 
 def test_a_terminal_says_units_and_colours_verdicts() -> None:

@@ -7,7 +7,7 @@ follow from the table.
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import groupby
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, cast
@@ -274,7 +274,7 @@ class Results:
     Attributes
     ----------
     name : of the JSON document, without ending
-    facts : its keys beside the tables
+    facts : its keys
     tables : name -> table
 
     """
@@ -291,14 +291,8 @@ class Results:
         shown: Mapping[str, Column | Quantity | str] | Sequence[str],
         **about: Any,
     ) -> Table:
-        """Add a table, see `make_table`; it has a Parquet file of its name unless `file` is ''.
-
-        A table without a file stands in the JSON document, a list of rows under its name.
-        """
-        about = {'file': f'{name}.parquet'} | about
-        if not about['file']:
-            about.setdefault('pointer', partial(json_pointer, name, file=self.file))
-        self.tables[name] = make_table(name, caption, rows, shown, **about)
+        """Add a table, see `make_table`, with a Parquet file of its name."""
+        self.tables[name] = make_table(name, caption, rows, shown, file=f'{name}.parquet', **about)
         return self.tables[name]
 
     @property
@@ -307,18 +301,16 @@ class Results:
         return f'{self.name}.json'
 
     def to_json(self) -> dict[str, Any]:
-        """The JSON document: facts, then the tables without a Parquet file that are not in them."""
-        own = {n: t.records() for n, t in self.tables.items() if not t.file and n not in self.facts}
-        return known({**self.facts, **own})
+        """The JSON document."""
+        return known(self.facts)
 
     def write(self, folder: Path) -> list[Path]:
         """Write one Parquet file per table and the JSON document; their paths."""
         paths = [folder / self.file]
         write_json(paths[0], self.to_json())
         for table in self.tables.values():
-            if table.file:
-                paths.append(folder / table.file)
-                parquet.write_table(table.data, paths[-1])
+            paths.append(folder / table.file)
+            parquet.write_table(table.data, paths[-1])
         return paths
 
 

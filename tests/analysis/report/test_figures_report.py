@@ -9,6 +9,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
 from auv_analysis import load_scenario, simulate, summarize
@@ -119,6 +120,7 @@ def test_figures_are_what_the_journal_prints(figures):
         assert set(re.findall(rb'/Subtype /(\w+)', pdf)) == {b'Type0', b'CIDFontType2'}
         assert pdf.count(b'/FontFile2') == pdf.count(b'/Subtype /CIDFontType2') > 0
         assert set(re.findall(rb'/(?:ca|CA) ([0-9.]+)', pdf)) <= {b'0', b'1'}
+        assert not re.search(rb'/(Creator|Producer|CreationDate)\b', pdf), 'the same everywhere'
         with Image.open(figure.png) as image:
             assert image.size[0] == pytest.approx(184 * 6.27, abs=1.0)
 
@@ -312,7 +314,7 @@ def test_report_of_two_samples(case1, tmp_path, composing):
         html, _ = _write(tmp_path, {'cl': _short(case1['cl'], 0.01)})
     with style():
         for figure in figures.values():
-            figure.canvas.draw()
+            FigureCanvasAgg(figure).draw()
     assert len(figures) >= 7
     assert 'What was found' in _text(html)
 

@@ -113,15 +113,19 @@ def test_a_spike_of_one_sample_is_seen_on_the_figure(run, tmp_path) -> None:
 
 def test_lines_of_a_long_run_have_columns_over_all_that_is_shown_of_it(run) -> None:
     noise = np.random.default_rng(0).normal(size=(60_000, 6))
-    long = replace(repeated(run, len(noise)), t=1e-4 * np.arange(len(noise)), nu_d=noise)
-    error, late = long.nu_d - long.nu, long.t > 2.0
+    long = replace(repeated(run, len(noise)), t=50.0 + 1e-4 * np.arange(len(noise)), nu_d=noise)
+    error, late = long.nu_d - long.nu, long.t > 52.0
     drawn, end = digest(long), long.t[-1]
-    for part, seen, ends in (('early', ~late, (0.0, 2.0)), ('late', late, (2.0, end))):
+    for part, seen, ends in (('early', ~late, (50.0, 52.0)), ('late', late, (52.0, end))):
         wanted = thinned(long.t[seen], error[seen, 2], ends)
         for found, expected in zip(drawn.line('error', 2, part), wanted, strict=True):
             assert_array_equal(found, expected)
-    assert np.diff(drawn.line('energy')[0]).max() < 3 * end / COLUMNS
-    assert len(drawn.line('error', 2, 'log')[0]) > COLUMNS
+    assert np.diff(drawn.line('energy')[0]).max() < 3 * (end - 50.0) / COLUMNS
+    since, ends = long.t[1:] - 50.0, (run.step, end - 50.0)
+    wanted = thinned(since, np.abs(error[1:, 2]), ends, logarithmic=True)
+    assert len(wanted[0]) > COLUMNS
+    for found, expected in zip(drawn.line('error', 2, 'log'), wanted, strict=True):
+        assert_array_equal(found, expected)
 
 
 def test_shares_are_those_of_the_mean_energy_of_each_column(run) -> None:
@@ -176,7 +180,7 @@ def test_statistics_between_cuts() -> None:
     assert Statistics([1.0]).between() is None
 
 
-def test_a_sketch_in_blocks_is_that_of_the_whole(run) -> None:
+def test_a_sketch_in_blocks_is_that_of_the_whole(run, monkeypatch) -> None:
     whole = digest(run)
     parts = digest(in_blocks(run, 37))
     assert whole.columns == parts.columns
@@ -195,6 +199,23 @@ def test_a_sketch_in_blocks_is_that_of_the_whole(run) -> None:
     error = run.nu_d - run.nu
     assert_allclose(whole.part('error', 2.0).peak, np.abs(error[seconds]).max(axis=0))
     assert_allclose(whole.part('error').path, np.abs(np.diff(error, axis=0)).sum(axis=0))
+    monkeypatch.setattr('auv_analysis.report.digest.COURSE', 100)
+    early = run.t[:, None] < 7.5  # but for half a second, the least that a run dwells
+    changed = replace(
+        run,
+        nu=run.nu_d + 0.1 * early,
+        disturbance_estimate=early * run.disturbance_estimate,
+        applied=run.tau + early * (np.arange(6) == 2),
+    )
+    whole, parts = digest(changed), digest(in_blocks(changed, 37))
+    assert whole.settled == parts.settled == pytest.approx(7.49)
+    assert whole.estimates is parts.estimates is True
+    assert whole.missed.tolist() == parts.missed.tolist() == (np.arange(6) == 2).tolist()
+    assert whole.begin.tolist() == parts.begin.tolist() == [*run.eta[0], *changed.nu[0]]
+    assert whole.end.tolist() == parts.end.tolist() == run.eta[-1].tolist()
+    assert {*whole.course} == {'t', 'nu_d', 'F'}
+    for name, values in whole.course.items():
+        assert_array_equal(values, parts.course[name])
 
 
 def test_memory_does_not_grow_with_the_run(run) -> None:
@@ -211,9 +232,9 @@ def test_memory_does_not_grow_with_the_run(run) -> None:
 
 def test_a_gap_outside_a_line_does_not_break_it() -> None:
     t, y = np.arange(5.0, 9.0), np.arange(4.0)
-    for gap in ((1.0, 2.0), (8.95, 12.0)):
-        assert np.array_equal(broken((t, y), [gap], 0.1), (t, y))
-    broken_t, broken_y = broken((t, y), [(6.0, 6.8)], 0.1)
+    for outside in (1.1, 9.05):
+        assert np.array_equal(broken((t, y), [outside]), (t, y))
+    broken_t, broken_y = broken((t, y), [6.1])
     assert broken_t.tolist() == [5.0, 6.0, 6.1, 7.0, 8.0]
     assert np.isnan(broken_y).tolist() == [False, False, True, False, False]
 
@@ -226,7 +247,9 @@ def test_columns_at_the_ends_of_a_gap_are_kept(run) -> None:
 
 
 def test_errors_that_are_never_far_from_zero_have_settled_at_once(run) -> None:
-    assert digest(replace(run, nu=run.nu_d + 1e-4)).settled == 0.0
+    for samples in (2, 801):
+        near = replace(run, nu=run.nu_d + 1e-4).part(slice(0, samples))
+        assert digest(near).settled == 0.0
 
 
 @pytest.mark.parametrize(('seconds', 'split'), [(4.0, False), (4.1, True)])

@@ -86,8 +86,12 @@ class RunDigest(RunInfo):
     def drawn(self, name: str, column: int = 0, part: str = 'whole') -> Line:
         """The same line with a NaN in every gap, so that it breaks there."""
         origin = self.start if part == 'log' else 0.0
-        gaps = [(begin - origin, end - origin) for begin, end in self.gaps]
-        return broken(self.line(name, column, part), gaps, self.step)
+        return broken(self.line(name, column, part), [t - origin for t in self.breaks])
+
+    @property
+    def breaks(self) -> list[float]:
+        """Where a line breaks, s: a step behind the begin of every gap."""
+        return [begin + self.step for begin, _ in self.gaps]
 
     def part(self, name: str, first: float = 0.0, last: float = FOREVER) -> Part:
         """Statistics of a signal in [first, last], s from the start.
@@ -181,9 +185,8 @@ def digest(run: Run, window: float = ENERGY_WINDOW) -> RunDigest:
     builder = _Builder(run, window)
     for block in run.blocks():
         builder.add(block)
-    true = run.knows_disturbance and not (run.sensing or run.acting)
-    whole = run.knows_wrench and not run.unknown
-    if true and whole and run.law in LAWS and run.gains:
+    ideal = run.knows_wrench and not (run.sensing or run.acting)
+    if ideal and run.law in LAWS and run.gains:
         builder.add_certificate()
     return builder.built()
 
@@ -206,7 +209,7 @@ def signals(run: Run, model: ControlModel) -> dict[str, np.ndarray]:
         found['wanted'] = wanted.sum(axis=1, keepdims=True)
     for name in ESTIMATES:
         wrench, error = getattr(run, name), getattr(run, f'{name}_error')
-        if wrench is not None and error is not None:
+        if wrench is not None:
             found |= {name: wrench, 'least': wrench - 2.0 * error, 'most': wrench + 2.0 * error}
     if run.applied is not None:
         found['applied'] = run.applied
@@ -282,7 +285,7 @@ class _Builder:
         """Go through the run once more for the lines of its certificate."""
         for found in certificate_blocks(self._run, self._model):
             if np.isnan(found.L[0]):
-                return  # z is not known
+                return  # a velocity, z or F is not known
             seen = found.L > 0
             if seen.any():
                 self._trace('L', 'whole', 0, found.t[seen], found.L[seen])

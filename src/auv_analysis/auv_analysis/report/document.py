@@ -22,7 +22,7 @@ from pyarrow import parquet
 
 from auv_analysis.metrics.quantities import SIGNALS
 from auv_analysis.output.arrow import pa
-from auv_analysis.output.text import Maths, fixed, join, number, plain, tied
+from auv_analysis.output.text import Maths, fixed, join, number, tied
 from auv_analysis.report.panels import Interactive, PanelSet
 from auv_analysis.report.plots import FigureRecord
 from auv_analysis.report.results import Table, numbers_of
@@ -182,9 +182,8 @@ def environment(folder: Path) -> jinja2.Environment:
         undefined=jinja2.StrictUndefined,
     )
     found.filters |= {
-        'num': number, 'plain': plain, 'fixed': fixed, 'tied': tied, 'join_words': join,
-        'maths': maths, 'symbols': lambda text: maths(Maths(text)),
-        'by_kind': by_kind, 'data': data_of,
+        'num': number, 'fixed': fixed, 'join_words': join, 'maths': maths,
+        'symbols': lambda text: maths(Maths(text)), 'by_kind': by_kind, 'data': data_of,
     }  # fmt: skip
     return found
 

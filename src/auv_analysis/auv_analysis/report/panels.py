@@ -43,7 +43,7 @@ SECTIONS = {  # part of the report -> its signals, beginnings of the figures its
 class TimeCurve:
     """A line of a run: its degree of freedom or what it is, colour, times and values (n,).
 
-    It breaks at gaps, from and to in s, of a run with samples a step apart.
+    It breaks at some times, s.
     """
 
     run: str
@@ -52,8 +52,7 @@ class TimeCurve:
     t: np.ndarray
     y: np.ndarray
     width: float = LINE
-    gaps: tuple[tuple[float, float], ...] = ()
-    step: float = 0.0
+    breaks: Sequence[float] = ()
 
     @property
     def dof(self) -> str:
@@ -225,7 +224,7 @@ def _draw(plot: Any, panel: TimePanel, dashes: Mapping[str, list[int]], columns:
         t, y = curve.t, curve.y
         if panel.kind != 'stack' and len(t) > 2 * columns:
             t, y = thinned(t, y, columns=columns)
-        t, y = broken((t, y), curve.gaps, curve.step)
+        t, y = broken((t, y), curve.breaks)
         times = t.tobytes()
         if times not in sources:
             sources[times] = ColumnDataSource({'t': t.astype(np.float32)})
@@ -361,4 +360,4 @@ def _curve(
     parts = ('whole',) if (signal, 'whole') in run.traces else ('early', 'late')
     lines = [run.line(signal, column, part) for part in parts]
     t, y = (np.concatenate(values) for values in zip(*lines, strict=True))
-    return TimeCurve(name, key, colour, t, y, width, run.gaps, run.step)
+    return TimeCurve(name, key, colour, t, y, width, run.breaks)

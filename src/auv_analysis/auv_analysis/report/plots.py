@@ -95,9 +95,7 @@ def style() -> AbstractContextManager[None]:
 def new_figure(height: float) -> Figure:
     """Empty figure of a height in inches, as wide as the text of a page, without pyplot."""
     layout = ConstrainedLayoutEngine(w_pad=0.05, h_pad=0.04, wspace=0.03, hspace=0.03)
-    figure = Figure(figsize=(WIDTH, height), layout=layout)
-    FigureCanvasAgg(figure)
-    return figure
+    return Figure(figsize=(WIDTH, height), layout=layout)
 
 
 def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:

@@ -1,7 +1,6 @@
 """Plots of runs: signals, errors still to come, energy, certificate, couplings."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -46,7 +45,7 @@ def draw_figures(
 
     Parameters
     ----------
-    runs : name -> run, any number of any laws; the name goes into titles and file names
+    runs : name -> run, any number of any laws; the name is that of its controller
     folder : where the files go; made when it is not there
     summaries : name -> `summarize(run)`, for the certificate; none: it is not drawn
     limits : name -> (6,) axis limits of the actuators, N and N m; none: there are none
@@ -56,20 +55,20 @@ def draw_figures(
     figures : in the order of the report; lumped errors only where F is known and estimated
 
     """
-    drawn = {name: replace(run, controller=name) for name, run in digests(runs).items()}
+    drawn = digests(runs)
     made: dict[str, Callable[[], Drawn]] = {}
-    for run in drawn.values():
-        made[f'errors_{run.controller}'] = partial(_errors, run)
+    for name, run in drawn.items():
+        made[f'errors_{name}'] = partial(_errors, run)
     made['settling'] = partial(settling, drawn)
-    for run in drawn.values():
+    for name, run in drawn.items():
         if run.knows_disturbance:
-            made[f'lumped_error_{run.controller}'] = partial(_lumped, run)
+            made[f'lumped_error_{name}'] = partial(_lumped, run)
     for name, run in drawn.items():
         for kind in ESTIMATES:
             if kind in run.columns:
                 made[f'{kind}_{name}'] = partial(estimate_figure, run, kind)
-    for run in different_disturbances(drawn).values():
-        made[f'uncertainty_{run.controller}'] = partial(_uncertainty, run)
+    for name, run in different_disturbances(drawn).items():
+        made[f'uncertainty_{name}'] = partial(_uncertainty, run)
     for name, run in drawn.items():
         made[f'inputs_{name}'] = partial(_inputs, run, (limits or {}).get(name))
     if len(drawn) > 1:

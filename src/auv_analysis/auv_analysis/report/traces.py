@@ -1,6 +1,6 @@
 """Lines with few points that look the same: the extremes of every column of pixels."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -78,10 +78,10 @@ def thinned(
     return t[keep], y[keep]
 
 
-def broken(line: Line, gaps: Iterable[tuple[float, float]], step: float) -> Line:
-    """The same line with a NaN a step behind the begin of every gap that it crosses."""
+def broken(line: Line, breaks: Sequence[float]) -> Line:
+    """The same line with a NaN at each of some times that it crosses."""
     t, y = line
-    places = np.array([begin + step for begin, _ in gaps])
+    places = np.asarray(breaks)
     at = np.searchsorted(t, places)
     inside = (at > 0) & (at < len(t))
     return np.insert(t, at[inside], places[inside]), np.insert(y, at[inside], np.nan)

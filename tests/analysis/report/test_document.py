@@ -2,8 +2,10 @@
 
 import platform
 import re
+from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
+from types import SimpleNamespace
 
 import pyarrow.parquet as parquet
 import pytest
@@ -57,6 +59,9 @@ def test_a_report_says_what_made_it(folder, monkeypatch):
     for program, command in (('bin/auv', "auv simulate 'a b'"), ('other.py', '')):
         monkeypatch.setattr('sys.argv', [program, 'simulate', 'a b'])
         assert document.provenance()['command'] == command
+    now = lambda zone: datetime(2026, 3, 4, 17, 8, tzinfo=zone)  # noqa: E731
+    monkeypatch.setattr(document, 'datetime', SimpleNamespace(now=now))
+    assert document.provenance()['written'] == '2026-03-04 17:08 UTC'
     monkeypatch.setattr(document, 'PACKAGES', ('no such package', 'numpy'))
     assert list(document.provenance()['versions']) == ['Python', 'numpy']
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from matplotlib.colors import LogNorm
+from matplotlib.colors import LogNorm, to_hex
 from PIL import Image
 
 from auv_analysis.output.text import number, typeset
@@ -22,7 +22,7 @@ def test_scale_is_logarithmic_only_where_it_has_to_be() -> None:
     columns = ('a', 'b')
     assert not isinstance(HeatMap(np.array([[1.0, 10.0]]), columns, '').norm(), LogNorm)
     assert not isinstance(HeatMap(np.array([[1.0, 19.5]]), columns, '').norm(), LogNorm)
-    assert isinstance(HeatMap(np.array([[1.0, 20.5]]), columns, '').norm(), LogNorm)
+    assert isinstance(HeatMap(np.array([[0.0, 1.0, 20.5]]), 'abc', '').norm(), LogNorm)
     far = HeatMap(np.array([[1.0, 1e9]]), columns, '').norm()
     assert isinstance(far, LogNorm)
     assert (far.vmin, far.vmax) == pytest.approx((1e5, 1e9)), 'four decades at most'
@@ -74,6 +74,10 @@ def test_an_axis_is_logarithmic_where_something_positive_is_to_be_seen() -> None
         axes = _axes(*points)
         plots.logarithmic(axes, 'y')
         assert (axes.get_xscale(), axes.get_yscale()) == ('linear', scale), points
+    axes = _axes(-1.0, 10.0, 1e7)
+    axes.plot([0.0, 1.0, 2.0], [1.0, 10.0, 1e7])
+    plots.logarithmic(axes, 'y')
+    assert axes.get_yscale() == 'log', 'one of them has a place on it'
     text = _logarithmic(1.0, 10.0, 1e7).yaxis.get_major_formatter()
     assert [text(x, 0) for x in (1e-4, 0.01, 1e5)] == ['0.0001', '0.01', '100000']
     assert [text(x, 0) for x in (1e-5, 1e6)] == ['$10^{-5}$', '$10^{6}$']
@@ -103,6 +107,9 @@ def test_a_symmetric_axis_marks_where_it_becomes_logarithmic() -> None:
     ends = sorted(axes.get_yticks())
     assert [ends[0], ends[-1]] == [-100.0, 1000.0], 'the ends of the data have their numbers'
     assert plots.symmetric(_axes(-1.0, 0.0, 2.0), 0.2) == 0.1
+    axes = _axes(-1.0, 0.0, 1e4)
+    plots.symmetric(axes, 1.0)
+    assert sorted(axes.get_yticks()) == [-1.0, 0.0, 1.0, 1e2, 1e4], 'every other of five powers'
 
 
 def test_a_small_bar_has_its_colour_in_the_png(tmp_path) -> None:
@@ -116,9 +123,15 @@ def test_a_small_bar_has_its_colour_in_the_png(tmp_path) -> None:
         )
         png, _ = plots.save(figure, tmp_path, 'bars')
     pixels = np.asarray(Image.open(png).convert('RGB')).reshape(-1, 3).astype(int)
+    assert pixels[1].tolist() == [255, 255, 255]
     for colour in plots.COLOURS:
         wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
         assert np.abs(pixels - wanted).max(axis=1).min() <= 12, colour
+
+
+def test_as_many_lines_as_a_panel_may_have_are_told_apart() -> None:
+    colours = {to_hex(plots.look(i)['color']) for i in range(plots.MOST_LINES)}
+    assert len(colours) == plots.MOST_LINES == 8
 
 
 @pytest.mark.parametrize('location', ['bottom', 'right'])

@@ -6,12 +6,16 @@ import zlib
 from dataclasses import replace
 from types import SimpleNamespace as Made
 
+import numpy as np
 import pytest
+from helpers.shown import panel_lines
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.report import panels as page
 from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.panels import (
+    TimeCurve,
+    TimePanel,
     different_disturbances,
     interactive,
     packed,
@@ -101,6 +105,18 @@ def test_many_lines_are_thinned_to_a_budget(case1, monkeypatch):
     monkeypatch.setattr(page, 'POINTS', 1_000)
     monkeypatch.setattr(page, 'FEWEST', 50)
     assert len(packed(shown(case1))) < 0.8 * whole
+
+
+def test_a_line_with_more_than_two_points_in_a_column_is_thinned(monkeypatch):
+    monkeypatch.setattr(page, '_columns', lambda _: 100)
+    curves = (
+        TimeCurve('gvc', f'{n}', page.INK, np.arange(1.0, n + 1.0), np.arange(n) % 7.0)
+        for n in (200, 201)
+    )
+    found = page.document([TimePanel('p', 'T', 'l', (*curves,))], {'gvc': []}, (), (1.0, 9.0))
+    few, many = (line for line in panel_lines(found) if line.startswith('  Line'))
+    assert '200 evenly 1 to 200' in few
+    assert ': 201' not in many
 
 
 @pytest.mark.parametrize(

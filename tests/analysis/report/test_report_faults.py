@@ -68,7 +68,9 @@ def test_all_that_it_shows(folder, approved):
 
 def test_the_set_up_says_every_fault(runs):
     summaries = {name: summarize(run) for name, run in runs.items()}
-    rows = dict(set_up(runs, summaries, TEXT).rows)
+    bare = replace(runs['gvc'].vehicle, thrusters=None)
+    others = {'other': replace(runs['gvc'], scenario='another', vehicle=bare), **runs}
+    rows = dict(set_up(others, summaries | {'other': summaries['gvc']}, TEXT).rows)
     assert rows['faults'] == [
         'thruster T3 at 50 %, 1–2 s',
         '25 % of the measurements lost, 1.5–1.8 s',
@@ -93,10 +95,11 @@ def test_spans_and_numbers_of_a_figure(runs):
     high = [text.get_position()[1] for text in axes.texts]
     assert high[1] < high[0], 'two at one time stand below each other'
     assert axes.get_xlim() == (0.0, 2.2)
-    axes.clear()
-    axes.set_xlim(2.2, 2.6)
-    plots.shade(axes, digest)
-    assert [text.get_text() for text in axes.texts] == ['3'], 'those before are not seen here'
+    for limits, seen in (((2.2, 2.6), ['3']), ((2.0, 2.5), [])):
+        axes.clear()
+        axes.set_xlim(limits)
+        plots.shade(axes, digest)
+        assert [text.get_text() for text in axes.texts] == seen, 'not those before and behind'
     sentence = plots.shade_sentence(digest)
     assert sentence.startswith(' Shaded: 1 thruster T3 at 50 %, 1–2 s; 2 25 % of the meas')
 
@@ -178,6 +181,7 @@ def test_the_section_and_its_sentences_are_on_the_page(folder):
 def test_runs_with_other_faults_share_no_section(runs, tmp_path):
     other = replace(runs['slow'], faults=())
     assert fault_part(tmp_path, {'gvc': runs['gvc'], 'slow': other}) is None
+    assert fault_part(tmp_path, {'slow': other}) is None, 'without any'
     assert not list(tmp_path.iterdir())
 
 

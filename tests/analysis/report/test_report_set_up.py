@@ -20,7 +20,7 @@ from auv_analysis.report.digest import digest, digests
 from auv_analysis.report.run_report import write_report
 from auv_analysis.report.run_tables import certificate_table, reasons
 from auv_analysis.report.scenario_text import _of_the_runs, _signal, gain_text, harmonics, set_up
-from auv_analysis.report.wrench_plots import certificate_figure
+from auv_analysis.report.wrench_plots import _rates, certificate_figure
 from auv_analysis.runs.run import FOREIGN, Run
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.model import control_model
@@ -140,6 +140,10 @@ SCENARIOS: dict[str, dict] = {
         {'kind': 'sensor_delay', 'delay': 0.1, 'from': 1.0, 'to': 2.0},
         {'kind': 'wrench_loss', 'from': 3.0},
     ]},
+    'one limit': {
+        'actuators': {'limit': 500},
+        'disturbance': {'kind': 'harmonic', **{dof: {'offset': 10.5} for dof in DOFS}},
+    },
     'delayed': {'faults': [{'kind': 'sensor_delay', 'delay': 0.1, 'from': 1.0, 'to': 2.0}]},
 }  # fmt: skip
 
@@ -179,7 +183,8 @@ def test_gains_too_fast_for_the_step_are_warned_of_in_sampled_runs_only(rough):
     runs, summaries, text = rough
     fast = {name: run for name, run in runs.items() if name == 'pid'}
     fast['pid'] = replace(fast['pid'], step=0.5)
-    assert any('pid: lambda_max' in line for line in _words(fast, summaries, text)['warnings'])
+    for told in ('pid: lambda_max', "pid: the law's own states"):
+        assert any(told in line for line in _words(fast, summaries, text)['warnings']), told
     inside = {'pid': replace(fast['pid'], hold='continuous')}
     words = _words(inside, summaries, text)
     assert not [line for line in words.get('warnings', []) if 'lambda_max' in line]
@@ -264,6 +269,26 @@ def test_certificate_arrays_are_those_of_the_summary(case1):
         assert certificate_of(replace(run, **change), control_model(run.vehicle)) is None
 
 
+def test_a_certificate_is_drawn_of_what_it_is_about(case1):
+    run = case1[0]['gvc'].part(slice(0, 50))
+    unknown = np.full_like(run.nu, np.nan)
+    for change, there in (
+        ({}, True), ({'law': 'pid'}, False), ({'gains': {}}, False), ({'disturbance': None}, False),
+        ({'measured': run.nu}, False), ({'applied': run.tau}, False), ({'tau': unknown}, False),
+        ({'nu': unknown}, False),
+    ):  # fmt: skip
+        traces = {name for name, _ in digest(replace(run, **change)).traces}
+        assert traces & {'L', 'bound'} == ({'L', 'bound'} if there else set()), change
+
+
+def test_a_line_of_L_begins_where_it_is_not_zero():
+    run = made('gvc', 'gvc', 1)
+    run.nu[0], run.law_state[0], run.disturbance_estimate[0] = run.nu_d[0], 0.0, run.disturbance[0]
+    t, L = digest(run).line('L')
+    assert t.tolist() == run.t[1:].tolist()
+    assert L.min() > 0.0
+
+
 def test_certificate_figure_says_what_it_rests_on(case1, approved):
     run, summary = case1[0]['gvc'], case1[1]['gvc']
     with plots.style():
@@ -302,12 +327,33 @@ def test_certificate_figure_of_next_to_nothing(case1):
     assert certificate_figure(digest(run.part(run.t <= 0.025)), summary)[0], 'three samples'
 
 
+@pytest.mark.parametrize(
+    ('part', 'first', 'bound', 'linear'),
+    [
+        ('early', 9.0, 50.0, None), ('early', 9.0, 51.0, 10.0), ('early', 1e7, 0.0, 100.0),
+        ('late', 400.0, 1e4, 1000.0), ('late', 5.0, 1e7, 100.0),
+    ],
+)  # fmt: skip
+def test_rates_have_a_linear_part_for_what_is_left_of_a_peak(part, first, bound, linear) -> None:
+    """5 W in the last quarter of the first phase; of the rest all but the bound, 1e-5 at least."""
+    t, signals = np.arange(9.0), dict.fromkeys(('L_dot', 'increasing'), np.zeros(9))
+    signals['identity'] = np.array([first, 0.0, 0.0, 0.0, 0.0, 0.0, -5.0, 1.0, 1.0])
+    signals['bound'] = np.array([-bound, *[0.0] * 8])
+    axes = plots.new_figure(2.0).subplots()
+    run = SimpleNamespace(line=lambda name, column, part: (t, signals[name]))
+    assert _rates(axes, run, part) is (linear is not None)
+    assert getattr(axes.yaxis.get_transform(), 'linthresh', None) == linear
+
+
 def test_axes_that_are_called_logarithmic_are(case1):
     runs = case1[0]
     with plots.style():
         shares, _, caption = run_plots.energy_shares(digests(runs))
         assert 'logarithmic axis' in caption
         assert shares.axes[0].get_xscale() == 'log'
+        slight = replace(runs['gvc'], nu=runs['gvc'].nu * [1.0, 1.0, 1.0, 1.0, 1.0, 1e-6])
+        shares, _, _ = run_plots.energy_shares(digests({'gvc': slight}))
+        assert shares.axes[0].get_xlim()[0] == 1e-6, 'no further'
         pushed = replace(runs['gvc'], tau=-np.abs(runs['gvc'].tau))
         inputs, _, _ = run_plots.inputs(digests({'gvc': pushed}))
         assert {axes.get_xscale() for axes in inputs.axes} == {'log'}

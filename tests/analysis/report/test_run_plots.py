@@ -37,8 +37,14 @@ from auv_analysis.report import plots
 from auv_analysis.report.digest import digests
 from auv_analysis.report.faults import fault_figure
 from auv_analysis.report.panels import document, interactive, panel_sets
-from auv_analysis.report.run_plots import APART, _symmetric, draw_figures, inputs
-from auv_analysis.report.wrench_plots import _applied_caption
+from auv_analysis.report.run_plots import (
+    APART,
+    _named_dashes,
+    _symmetric,
+    draw_figures,
+    inputs,
+)
+from auv_analysis.report.wrench_plots import _applied_caption, _panel
 from auv_analysis.runs.run import Run
 from auv_gvc_controller.laws.model import control_model
 
@@ -248,6 +254,7 @@ def test_captions_name_the_dashes_of_each_run(three, pair) -> None:
     dashes = [artists._look(h)['dashes'][1] for h in three[0]['settling'].legends[0].legend_handles]
     assert [None if d is None else len(d) for d in dashes] == [None, 2, 2]
     assert dashes[1][0] > dashes[2][0], 'a dash is longer than a dot'
+    assert _named_dashes(dict.fromkeys('abcdefg')).endswith('f dash-dot-dotted and g solid')
 
 
 @pytest.mark.parametrize('together', ['pair', 'three'])
@@ -427,13 +434,18 @@ def test_a_caption_says_what_the_actuators_did(runs) -> None:
 def test_a_command_that_leaves_its_panel_is_told_with_its_sign_and_time(runs, tmp_path) -> None:
     run = runs['three']
     tau, applied = 0.0 * run.tau, 0.01 * run.tau
-    tau[:, 4], tau[77, 4], applied[:, 0] = run.tau[:, 4], -50_000.0, 0.0
-    figures, captions = _drawn({'three': replace(run, tau=tau, applied=applied)}, tmp_path)
+    tau[:, [0, 4]], tau[77, 4], applied[:, 0] = run.tau[:, [0, 4]], -50_000.0, 0.0
+    three = {'three': replace(run, tau=tau, applied=applied)}
+    figures, captions = _drawn(three, tmp_path)
     pitch = figures['inputs_three'].axes[3]
     assert pitch.get_title(loc='right') == f'command to −50\u202f000 N m at {run.t[77]:.2f} s'
     most = np.abs(applied[:, 4]).max()
     assert pitch.get_ylim() == pytest.approx((-1.25 * most, 1.25 * most))
     assert 'The commands in pitch leave the panel' in captions['inputs_three']
+    axes = plots.new_figure(2.0).subplots()
+    assert _panel(axes, digests(three)['three'], 4, 1e3)
+    assert levels(axes) == [-1e3, 1e3], 'far above what is applied, not what is commanded'
+    assert axes.get_ylim() == (-1250.0, 1250.0)
     assert [
         a.get_title(loc='right') for k, a in enumerate(figures['inputs_three'].axes) if k != 3
     ] == [''] * 5
@@ -543,7 +555,7 @@ def test_what_was_not_recorded_is_said_in_its_panel(runs, foreign, tmp_path) -> 
     alone, _ = _drawn({'told': replace(told, unexplained=wrench, faults=())}, tmp_path)
     del lost['three']
     lost['one'].tau[:, 3] = 0.0
-    lost['two'].nu[:, 2] = np.nan  # heave is seen in the other run
+    lost['two'].nu[:, 2] = lost['two'].tau[:, 2] = np.nan  # heave is seen in the other run
     figures, captions = _drawn(lost, tmp_path)
     scales = [axes.get_yscale() for axes in figures['inputs_compared'].axes]
     assert scales[3] == 'linear', 'what does nothing is not far from what does'
@@ -585,6 +597,7 @@ FAULTS = *MARKS, MARKS[1]._replace(number=3), MARKS[1]._replace(number=4, start=
 def page(runs):
     """Bokeh's figures of the page of all runs by name, and the panels that they are of."""
     from bokeh.document import Document
+    from bokeh.models import BoxZoomTool, CrosshairTool, HoverTool
 
     made: list[Document] = []
 
@@ -604,8 +617,15 @@ def page(runs):
     assert roots == {name: plot.id for name, plot in plots_of.items()}
     for name, plot in plots_of.items():
         assert [legend.click_policy for legend in plot.legend] == ['hide'], name
+        assert plot.x_range.bounds == (START, START + 12.0), name
+        assert plot.toolbar.active_drag == plot.select_one(BoxZoomTool), name
+        assert plot.toolbar.active_scroll is None, 'a page scrolls'
+        assert plot.select_one(CrosshairTool).overlay.dimension == 'height'
         if panels[name].kind != 'stack':
-            assert plot.y_range.only_visible, name
+            assert (plot.y_range.only_visible, plot.window_axis) == (True, 'x'), name
+            hover = plot.select_one(HoverTool)
+            assert (hover.mode, hover.line_policy) == ('vline', 'nearest')
+            assert hover.formatters == {'$snap_y': 'printf'}
     return plots_of, panels
 
 
@@ -701,6 +721,7 @@ def test_faults_are_shaded_in_interactive_panels_where_they_are(page) -> None:
         assert not isinstance(boxes[1].right, float)
         labelled = [(label.text, label.x) for label in labels]
         assert labelled == [('1', 5.0), ('2', 6.0), ('3', 6.0), ('4', 7.0)]
+        assert {label.y_units for label in labels} == {'screen'}
         first, second, third, fourth = (label.y for label in labels)
         assert first > second > third == fourth, 'those at one time stand below each other'
 
@@ -722,12 +743,28 @@ def test_what_cannot_be_drawn_is_said_in_place_of_a_figure(tmp_path) -> None:
     runs = {
         'aimless': made('aimless', 'gvc', 4, nu_d=unknown, **about),
         'lost': made('lost', 'gvc', 5, nu=unknown, **about, **estimate),
-        'still': made('still', 'pid', 6, nu=zero, nu_d=zero, tau=zero, disturbance_estimate=zero),
+        'still': made(
+            'still', 'pid', 6, nu=zero, nu_d=zero, tau=zero, disturbance_estimate=zero, applied=zero
+        ),
     }
     for name, run in runs.items():
         _, captions = _drawn({name: run}, tmp_path / name)
         told = [text for text in captions.values() if 'Not recorded' not in text]
         assert any(text.endswith(END[name]) for text in told)
+    sets = panel_sets(digests(runs))
+    shown = {panel.name: panel for part in sets.values() for panel in part.panels}
+    seen: dict[str, set[str]] = {}
+    for name, panel in shown.items():
+        of = {curve.run for curve in panel.curves}
+        assert seen.setdefault(name.partition('-')[0], of) == of, 'in both halves'
+    assert seen == {
+        'F': {'still'}, 'tau': {*runs}, 'kinetic': {*runs}, 'shares': {'aimless'},
+        'energy': {'aimless', 'still'}, 'delta_xi': {'aimless', 'still'}, 'delta_pi': {*runs},
+    }  # fmt: skip
+    assert [(curve.run, curve.key) for curve in shown['kinetic'].curves] == [
+        ('aimless', 'of the run'), ('lost', 'of the set-point'),
+        ('still', 'of the set-point'), ('still', 'of the run'),
+    ]  # fmt: skip
 
 
 END = {

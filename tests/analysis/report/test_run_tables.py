@@ -18,6 +18,7 @@ from auv_analysis.report.run_report import (
     NO_F,
     SectionInputs,
     _apart,
+    _is_noise,
     _listings,
     findings,
     namesakes,
@@ -61,6 +62,8 @@ def test_controllers_with_their_laws_gains_and_origins(runs) -> None:
     one, two = (row[2].text for row in table.rows)
     assert one == 'k_D = 12 I, k_I = 1 I, Lambda = 0.8 I, Gamma = 60 I'
     assert two.startswith('k_D = diag(1, 2, 3, 4, 5, 6), k_I = 2 I, Lambda = 0.5 I, Gamma = 7 I')
+    (untold,) = tables.controllers_table({'x': replace(runs['one'], law='pid', gains={})}).rows
+    assert untold[2].text == '', 'neither gains nor defaults'
 
 
 def test_couplings_say_symbol_rule_and_unit(summaries) -> None:
@@ -383,8 +386,15 @@ def test_an_error_within_its_noise_floor_is_said_to_be(runs, summaries) -> None:
             'table-key_figures'
         ]
         assert words_ in text
-    drifting = replace(run, nu=run.nu_d - noise - 0.5, measured=run.nu)
+    drifting = replace(run, nu=run.nu_d - noise + 0.5, measured=run.nu)
     assert 'does not settle' in said({'one': drifting}, {'one': summary})['table-key_figures'][0]
+    third = np.arange(SAMPLES - 160)  # the last samples
+    for turns, about in ((10, {'measured': run.nu}), (9, {'measured': run.nu}),
+                         (10, {'acceleration': {'filter': 'f', 'window': 1.0}})):  # fmt: skip
+        waves = np.ones((SAMPLES, 6))
+        waves[160:] = 2.0**-8 * (-1.0) ** (third * (turns + 1) // len(third))[:, None]
+        (turning,) = digests({'one': replace(run, nu_d=0.0 * waves, nu=waves, **about)}).values()
+        assert _is_noise(turning, 1) == (turns == 10)
 
 
 def test_runs_of_one_name_and_other_set_points_are_told_of(runs) -> None:

@@ -62,6 +62,8 @@ def test_errors_gains_and_peaks_are_in_the_first_sentence(two: Runs) -> None:
         assert abs(shown - value) <= half
     assert 'velocity gain K_D in translation' in first
     assert 'auv tune SCENARIO' in second
+    gains = said(two, K_D=(np.diag([1.0, 1.5, 1.2, 2.0, 2.0, 2.0]), np.eye(6)))
+    assert '1.0 to 1.5 times the velocity gain K_D in translation and 2.0 times in' in gains
     assert verdict(dict(reversed(runs.items())), summaries)[0] == first
 
 
@@ -100,6 +102,7 @@ def test_the_verdict_stands_above_the_tables_and_first_in_the_report(
 
 ONE, HALF, TWICE = [1.0] * 6, [0.5] * 6, [2.0] * 6
 MIXED = [0.5] * 3 + [2.0] * 3
+LATE = [0.5] * 5 + [1.0]
 
 
 @pytest.mark.parametrize(
@@ -112,12 +115,14 @@ MIXED = [0.5] * 3 + [2.0] * 3
         ({'rms': ([0.0] * 6, [0.0] * 6)}, ['track alike']),
         ({'rms': ([0.0] * 6, ONE)}, ['gvc tracks better', '0 times the RMS velocity error']),
         ({'rms': (HALF, ONE), 'peaks': ([0.0] * 6, [0.0] * 6)}, ['the same peak moment (0 ag']),
-        ({'rms': (HALF, ONE), 'peaks': (ONE, [0.0] * 6)}, ['infinitely many', '(1.00 against 0 N']),
+        ({'rms': (HALF, ONE), 'peaks': ([1.0] + [0.0] * 5, [0.0] * 6)},
+         ['infinitely many', '(1.00 against 0 N']),
         ({'rms': (HALF, ONE), 'peaks': ([0.0] * 6, ONE)}, ['0 times the peak force']),
         ({'rms': (HALF, ONE), 'K_D': (None, None)}, ['gvc tracks better than cl']),
-        ({'rms': (HALF, ONE), 'K_D': ([[0.0] * 6] * 6,) * 2}, ['gvc tracks better than cl']),
+        ({'rms': (HALF, ONE), 'K_D': (np.diag([1.0] * 5 + [0.0]), np.eye(6))},
+         ['gvc tracks better than cl']),
         ({'times': ([None] * 6, [None] * 6)}, ['neither gvc nor cl settles in all']),
-        ({'times': (ONE, TWICE)}, ['gvc settles in 1.0 s, cl settles in 2.0 s']),
+        ({'times': (LATE, [2.0, *LATE[1:]])}, ['gvc settles in 1.0 s, cl settles in 2.0 s']),
         ({'times': ([None, *ONE[1:]], ONE)}, ['cl settles in 1.0 s, gvc does not in surge']),
         ({'times': (ONE, [*ONE[1:], None])}, ['gvc settles in 1.0 s, cl does not in yaw']),
         ({'rms': (None, None), 'times': (None, None)}, []),
@@ -164,6 +169,8 @@ def test_where_none_is_best_in_both_the_best_in_each_are_compared(two: Runs) -> 
 def test_the_best_may_be_worse_by_less_than_counts(two: Runs) -> None:
     text = of_errors(two, a=(1.0, 1.0), b=(1.005, 0.5), c=(2.0, 2.0))
     assert text.startswith('Of 3 controllers, b tracks best, a next: ')
+    text = of_errors(two, a=(1.0, 1.0), b=(10.0, 1.5), c=(4.0, 4.0))
+    assert text.startswith('Of 3 controllers, a tracks best, b next: '), 'by the product'
 
 
 def longer(run: RunDigest, times: float) -> Extent:
@@ -191,8 +198,10 @@ def test_runs_are_ranked_where_they_share_all_but_the_law(two: Runs, word: str, 
     runs, summaries = two
     changed = runs | {'cl': replace(runs['cl'], **change(runs['cl']))}
     text = verdict(changed, summaries)[0]
-    wanted = f'These runs cannot be ranked: they differ in {word}.' if word else 'gvc tracks better'
-    assert text.startswith(wanted)
+    told = f'These runs cannot be ranked: they differ in {word}.'
+    assert text.startswith(told if word else 'gvc tracks better')
+    three = verdict(changed | {'third': changed['cl']}, summaries | {'third': summaries['cl']})[0]
+    assert three.startswith(told if word else 'Of 3 controllers')
 
 
 def test_what_is_not_alike_is_not_ranked(two: Runs, tmp_path: Path) -> None:
@@ -204,10 +213,15 @@ def test_what_is_not_alike_is_not_ranked(two: Runs, tmp_path: Path) -> None:
 
 
 def test_a_controller_that_diverged_is_named_first(two: Runs) -> None:
-    runs, summaries = two
-    left = {'gvc': replace(runs['gvc'], notes=(f'{FAILED}: cl diverges at 1 s',))}
-    (text,) = verdict(left, {'gvc': summaries['gvc']})
-    assert text == f'Not all are compared: {FAILED}: cl diverges at 1 s.'
+    notes = f'{FAILED}: slow diverges at 1 s', 'another note'
+    told = f'Not all are compared: {notes[0]}.'
+    runs, summaries = {name: replace(run, notes=notes) for name, run in two[0].items()}, two[1]
+    assert verdict({'gvc': runs['gvc']}, {'gvc': summaries['gvc']}) == [told]
+    moved = runs | {'cl': replace(runs['cl'], begin=runs['cl'].begin + 1.0)}
+    for found, then in ((runs, 'gvc tracks better'), (moved, 'These runs cannot be ranked')):
+        first, second, *_ = verdict(found, summaries)
+        assert first == told
+        assert second.startswith(then)
 
 
 @pytest.mark.parametrize(
@@ -216,4 +230,5 @@ def test_a_controller_that_diverged_is_named_first(two: Runs) -> None:
 )
 def test_laws_behind_devices_are_tuned_as_they_are_sampled(acting, sensing, words: str) -> None:
     run = SimpleNamespace(scenario='mine', law='gvc', acting=acting, sensing=sensing)
-    assert _tune('gvc', [run]) == f'auv tune SCENARIO{words}'
+    plain = SimpleNamespace(scenario='mine', law='cl', acting=(), sensing=())
+    assert _tune('gvc', [run, plain]) == f'auv tune SCENARIO{words}'

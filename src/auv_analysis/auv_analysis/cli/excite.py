@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
     vehicle = load_vehicle(options.vehicle)
-    steps = max(round(options.duration / options.step), 1)
+    steps = round(options.duration / options.step)
     request = Request(
         options.vehicle, bounds_of(options, vehicle), round(steps * options.step, 9), options.step,
         (*DEFAULT, *options.free), options.fixed, options.lag, options.velocity_noise,

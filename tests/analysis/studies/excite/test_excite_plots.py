@@ -21,7 +21,7 @@ def test_an_excitation(tmp_path) -> None:
     states = rng.normal(size=(26, 2, 51, 13)) + np.arange(13)
     commands = rng.normal(size=(26, 2, 50, 6)) * 9
     found = Made(
-        request=Made(steps=50, step=0.1, bounds=Made(room=np.array([8.0, 6.0, np.inf]))),
+        request=Made(step=0.1, bounds=Made(room=np.array([8.0, 6.0, np.inf]))),
         motion=Made(states=states, commands=commands),
     )
     rows = [

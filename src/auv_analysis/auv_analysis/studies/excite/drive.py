@@ -210,7 +210,7 @@ class Family:
         """Multisines of points (B, 2 m)."""
         count, m = len(x), len(self.driven)
         omega, phase = self.omega[self.driven], self.phase[self.driven]
-        shape = (omega / np.sqrt(omega[:, :1] * omega[:, -1:])) ** x[:, m:, None]  # (B, m, 6)
+        shape = omega ** x[:, m:, None]  # (B, m, 6)
         sines = np.sin(omega[..., None] * self.t + phase[..., None])  # (m, 6, n)
         peak = np.abs(np.einsum('bml,mln->bmn', shape, sines)).max(axis=-1)
         amplitude = shape * (np.exp(x[:, :m]) * self.most[self.driven] / peak)[..., None]

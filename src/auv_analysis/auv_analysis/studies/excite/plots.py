@@ -68,14 +68,14 @@ def _intervals(rows: Sequence[Mapping[str, Any]]) -> Drawn:
 
 def _wrench(found: Excited) -> Drawn:
     """Wrench and velocity over time."""
-    t = np.arange(found.request.steps + 1) * found.request.step
     panels = []
     for name, signals in (
         ('tau', found.motion.commands[0, 0]),
         ('nu', found.motion.states[0, 0, :, 7:]),
     ):
+        t = found.request.step * np.arange(len(signals))
         for i, dof in enumerate(DOFS):
-            curve = Curve(t[: len(signals)], signals[:, i], '',
+            curve = Curve(t, signals[:, i], '',
                           {'color': COLOURS[int(name == 'nu')], 'linewidth': 0.9})  # fmt: skip
             panels.append(Panel([curve], SIGNALS[name].unit_of(i), dof))
     ordered = [panel for pair in zip(panels[:6], panels[6:], strict=True) for panel in pair]

@@ -83,6 +83,14 @@ def test_the_verdict_on_a_vehicle_alone() -> None:
     rows[-2] = _predicted('black box', 0.5, *EVEN)
     assert identify.verdict_alone('v', rows).endswith('not clearly better than black box.')
     assert identify.verdict_alone('v', []) == 'Nothing was held out.'
+    short = [_predicted('persistence', 0.1, *WORSE), _predicted('black box', 0.2, *EVEN)]
+    assert identify.verdict_alone('v', short) == (
+        'v predicts worse than persistence at 0.1 s and not clearly better than black box.'
+    )
+    assert identify.verdict([_predicted('prior', 0.2, *BETTER)], []) == (
+        'The new model predicts what it has not seen better than the prior: '
+        '0.40 times its error at 0.2 s (0.30 to 0.50).'
+    )
 
 
 @pytest.mark.parametrize('border', [(0.8, 0.9, 1.0), (1.0, 1.1, 1.2)])
@@ -523,5 +531,5 @@ def test_the_largest_share_of_energy_in_case_1_is_shown() -> None:
     chart.reached['delta_xi_energy_percent'] = shares
     case1 = {'delta_xi_max': [1.0, 2, 3, 4, 5, 6], 'delta_xi_energy_percent': shares}
     results = Results('atlas', {'vehicles': {'a': {'case1': case1}}})
-    ((*cells,),) = atlas.reached(results, [chart, _chart('b', 0.1, [], 'x')], 'delta_xi').rows
+    ((*cells,),) = atlas.reached(results, [_chart('b', 0.1, [], 'x'), chart], 'delta_xi').rows
     assert [cell.value for cell in cells[1:]] == [1.0, 2.0, 3.0, 4.0, 5.0, None, 0.7]

@@ -5,6 +5,7 @@ import os
 import re
 import sys
 from argparse import Namespace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from auv_analysis.cli import predict as predict_command
 from auv_analysis.cli.main import main, parser
 from auv_analysis.output.folder import results_folder
 from auv_analysis.report.results import Results
-from auv_analysis.studies.identify import identify, prediction
+from auv_analysis.studies.identify import bags, identify, prediction
 from auv_analysis.studies.identify.bags import read_records
 from auv_analysis.studies.identify.vehicle_text import write_vehicle
 from auv_dynamics.files.errors import FailedError, InputError
@@ -109,7 +110,8 @@ def test_a_bag_of_its_own_is_held_out(short, bag):
     given = ['identify', str(short), '--vehicle', 'herman2018', '--holdout', str(bag)]
     trial = identify_command.read(parser().parse_args(given), 'identify')
     assert [round(one.end) for one in (*trial.training, *trial.held)] == [6, 60]
-    assert bag in trial.inputs
+    assert trial.inputs == [short, bag, shipped('vehicles', 'herman2018')]
+    assert trial.out == Path('runs/identify_herman2018')
 
 
 @pytest.mark.usefixtures('unrendered')
@@ -127,6 +129,7 @@ def test_intervals_on_request_stand_beside_the_others(bag, tmp_path, approved, c
     assert parquet.read_table(out / 'profiles.parquet').num_rows >= 5
     assert (out / 'figures' / 'profiles.png').exists()
     approved.folder(out)
+    approved.add(capsys.readouterr().out.splitlines())
 
 
 def test_the_file_predicts_the_recording(bag, identified, tmp_path, monkeypatch, capsys):
@@ -139,15 +142,31 @@ def test_the_file_predicts_the_recording(bag, identified, tmp_path, monkeypatch,
     document = json.loads((tmp_path / 'p' / 'predict.json').read_text(encoding='utf-8'))
     assert 'better than persistence and better than black box' in document['verdict']
     assert document['notes'] == ['odd']
+    assert (document['vehicle'], document['held_out'][0]['name']) == (
+        'herman2018_identified', bag.name
+    )  # fmt: skip
     assert document['verdict'] in ' '.join(printed.split())
     assert 'Open-loop prediction of what was held out' in printed
     assert (tmp_path / 'p' / 'figures' / 'prediction.png').exists()
 
 
+@pytest.mark.usefixtures('unrendered')
+def test_a_prediction_is_one_document_where_it_is_asked_for(short, tmp_path, monkeypatch, capsys):
+    numbers = ('error', 'linear', 'angular', 'ratio', 'ratio_low', 'ratio_high')
+    rows = [{'predictor': name, 'horizon': 0.5, **dict.fromkeys(numbers, 0.5)}
+            for name in ('persistence', 'black box')]  # fmt: skip
+    monkeypatch.setattr(identify, 'compared', lambda *_, **__: rows)
+    given = ('predict', short, '--vehicle', 'herman2018', '--out', tmp_path / 'p', '--json')
+    main([*map(str, given)])
+    found = json.loads((tmp_path / 'p' / 'predict.json').read_text())
+    assert json.loads(capsys.readouterr().out) == found
+
+
+@pytest.mark.usefixtures('unrendered')
 def test_a_recording_that_contradicts_the_prior_gives_no_file(bag, tmp_path, capsys):
     out = tmp_path / 'other'
     fewer = ('--part', '0:10', '--free', 'M.diagonal', '--free', 'D_linear')
-    given = ('identify', bag, '--vehicle', 'rexrov', '--out', out, '--no-report', *fewer)
+    given = ('identify', bag, '--vehicle', 'rexrov', '--out', out, *fewer)
     with pytest.raises(SystemExit) as end:
         main([*map(str, given), '--json'])
     said = capsys.readouterr()
@@ -156,14 +175,27 @@ def test_a_recording_that_contradicts_the_prior_gives_no_file(bag, tmp_path, cap
     assert '  least squares\n' in said.err, 'how far it is'
     assert json.loads(said.out) == json.loads((out / 'identify.json').read_text())
     assert not (out / 'vehicle.yaml').exists()
-    code, said = auv(capsys, *given, '--accept', '--overwrite')
+    assert 'No vehicle file: ' in (out / 'report.html').read_text(encoding='utf-8')
+    code, said = auv(capsys, *given, '--accept', '--overwrite', '--no-report')
     assert code == 0, said
     assert (out / 'vehicle.yaml').exists()
+    assert not (out / 'report.html').exists()
+    document = json.loads((out / 'identify.json').read_text())
+    assert document['file'] == 'vehicle.yaml'
+    assert document['verdict'].startswith('The new model ')
+    vehicle = load_vehicle(out / 'vehicle.yaml')
+    assert vehicle.name == 'rexrov_identified'
+    assert vehicle.source.startswith(f'identified from {bag.name}; prior: V. Berg')
+    listed = {row['name']: row['value'] for row in document['parameters']}
+    diagonal = [listed[f'M[{i}][{i}]'] for i in range(6)]  # of which some lie below M_RB
+    assert np.diag(vehicle.M) == pytest.approx(diagonal, rel=1e-5)
 
 
 def test_the_wrench_that_acted_takes_the_place_of_the_command_and_the_truth_that_of_nothing(
-    tmp_path,
+    tmp_path, monkeypatch
 ):
+    notes = []
+    monkeypatch.setattr(bags, 'contradictions', lambda *_: ['odd'])
     _, run = sea_trials.trial(tmp_path, 'herman2018', 5, duration=3.0)
     seen, frames = motion(run, enu=False), ('odom_ned', 'base_link_fsd')
     truth = seen._replace(twist=seen.twist + 0.01)
@@ -172,8 +204,9 @@ def test_the_wrench_that_acted_takes_the_place_of_the_command_and_the_truth_that
     messages += simple(truth, Maker(), '/ground_truth/odom', '/wrench_applied', frames, tau=half)
     bag, vehicle = write(tmp_path / 'bag', messages, Maker()), load_vehicle('herman2018')
     (asked,), (acted,) = (
-        read_records(bag, vehicle, None, applied=applied, notes=[]) for applied in (False, True)
+        read_records(bag, vehicle, None, applied=applied, notes=notes) for applied in (False, True)
     )
+    assert notes.count('odd') == 2
     np.testing.assert_allclose(acted.command, 0.5 * asked.command, atol=1e-9)
     assert np.abs(asked.command).max() > 1.0
     np.testing.assert_allclose(acted.velocity, run.nu, atol=1e-9)
@@ -204,11 +237,12 @@ def test_a_vehicle_that_no_command_takes_gives_no_file(tmp_path):
     ('extra', 'said'),
     [
         (('--free', 'D_lin'), 'nearest: D_linear'),
-        (('--holdout', '2'), '--holdout: expected a number'),
+        (('--holdout', '0.91'), '--holdout: expected a number'),
         (('--part', '100:200'), '--part: expected a time up to'),
         (('--part', '5:2'), 'argument --part'),
         (('--observer', '1'), 'argument --observer: expected'),
-        (('--bootstrap', '5'), 'argument --bootstrap: expected'),
+        (('--bootstrap', '39'), 'argument --bootstrap: expected'),
+        (('--segment', '0'), 'argument --segment: expected'),
         (('--profile', 'mass'), '--profile: expected one of'),
         (('--odom', '/odom', '--wrench', '/no'), '/no'),
         (('--odom', '/odom', '--wrench', '/wrench', '--applied'), 'options: wrench_applied'),
@@ -220,6 +254,13 @@ def test_refusals(short, extra, said, tmp_path, capsys):
     assert code == 2
     assert said in error
     assert not (tmp_path / 'x').exists()
+
+
+def test_a_bag_of_less_than_a_second_is_refused(tmp_path, capsys):
+    given = recording(tmp_path, 0.6), '--vehicle', 'herman2018', '--out', tmp_path / 'x'
+    code, error = auv(capsys, 'identify', *given)
+    assert code == 2
+    assert 'expected a second and more with attitude, velocity and wrench, found none' in error
 
 
 def test_rates_that_are_not_those_of_the_attitude_are_refused(tmp_path, capsys):
@@ -286,6 +327,7 @@ def test_what_the_command_line_asks_for_is_what_is_done(short, tmp_path, monkeyp
     ('{value: true, deviation: 1}', 'M.x.value: expected a number, found True'),
     ('{value: 1e300, deviation: 1}', 'M.x.value: expected a finite number, at most '),
     ('{value: 3, deviation: 1, mean: 2}', 'M.x.mean'),
+    ('{value: 3, deviation: 1}', 'prior.yaml: expected '),
 ])  # fmt: skip
 def test_a_prior_file_needs_values_and_deviations(entry, line, short, tmp_path, capsys):
     file = tmp_path / 'prior.yaml'

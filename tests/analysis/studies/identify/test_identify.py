@@ -216,6 +216,17 @@ def test_a_single_sine_leaves_open_what_it_does_not_move(tmp_path):
     assert len(outside) <= 0.1 * len(known) + 1, outside
 
 
+@pytest.mark.parametrize(('beside', 'said'), [(0.3, ['92 % of the power']), (0.36, [])])
+def test_nine_tenths_of_the_power_at_one_frequency_tell_little(beside, said):
+    """Sines of 1 and 3 Hz as a command; the velocity is noise."""
+    t, rng = 0.02 * np.arange(1001), np.random.default_rng(0)
+    sines = np.sin(2.0 * np.pi * t[:-1]) + beside * np.sin(6.0 * np.pi * t[:-1])
+    command = 5.0 + np.outer(sines, np.arange(6.0))
+    ahead = np.tile([1.0, 0.0, 0.0, 0.0], (1001, 1))
+    record = Record('x', t, ahead, t, rng.normal(size=(1001, 6)), 0.02, command, 0.0)
+    assert [text[:17] for text in excitation([record])] == said
+
+
 def test_gains_of_the_wrench_cannot_be_told_from_all_inertia(herman):
     training, held = split([herman[0]], 0.25)
     free = ('M', 'D_linear', 'D_quadratic', 'restoring', 'lag', 'delay', 'gain')
@@ -225,7 +236,17 @@ def test_gains_of_the_wrench_cannot_be_told_from_all_inertia(herman):
     M = rows['M.surge.surge']
     assert M['value'] == pytest.approx(300.0, rel=0.1), 'stays near the prior'
     assert M['high'] is None or M['high'] - M['low'] > 0.5 * M['value'], 'as unsure as the gain'
-    widest = result.combinations()[0]
+    every = result.combinations()
+    for one in every:
+        parts = np.abs(one['parts'])
+        assert len(parts) == len(one['names'])
+        assert_allclose(parts, sorted(parts, reverse=True))
+        assert parts[0] == 1.0
+        assert parts[-1] >= 0.35
+    left = [one['left'] for one in every]
+    assert left == sorted(left, reverse=True)
+    assert left[-1] >= 0.5
+    widest = every[0]
     assert widest['left'] > 0.5
     assert 'scale of the wrench' in widest['words']
 

@@ -42,7 +42,7 @@ def _identified():
     )
     rows = [
         {'unit': unit, 'pair': f'{unit} {k}', 'M': 3.0 * k + j, 'M_low': 3.0 * k - 1 - j,
-         'M_high': 3.0 * k + 4 + j, 'M_prior': 7.0 - k,
+         'M_high': 3.0 * k + 4 + j - 9 * (k == 2), 'M_prior': 7.0 - k,
          'verdict': 'not known' if k == 1 else 'real'}
         for j, unit in enumerate(('kg', 'kg m', 'kg m²')) for k in range(3)
     ]  # fmt: skip
@@ -72,7 +72,7 @@ def test_an_identification(tmp_path) -> None:
         assert lines['o'][0].tolist() == [row['M_prior'] for row in some]
         (bars,) = axes.collections
         for k, (row, segment) in enumerate(zip(some, bars.get_segments(), strict=True)):
-            ends = (row['M'], row['M']) if k == 1 else (row['M_low'], row['M_high'])
+            ends = (row['M'], row['M']) if k == 1 else (row['M_low'], max(row['M'], row['M_high']))
             assert segment[:, 0] == pytest.approx(ends)
             assert segment[:, 1].tolist() == [k, k]
         assert levels(axes, 'x') == [0.0]
@@ -123,3 +123,13 @@ def test_spectra_of_residuals_are_one_where_they_are_white(tmp_path) -> None:
         assert p == pytest.approx(10.0 * np.mean([x[1] for x in spectra], axis=0)[1:])
         assert levels(axes) == [1.0]
         assert np.mean(p) == pytest.approx(1.0, abs=0.25)
+    for count, drawn in ((16, 0), (17, 1)):
+        few = [(Made(at=at[:count], nu=np.zeros((count, 6))), e[:count])
+               for e in [pairs[0][1]] for at in [pairs[0][0].at]]  # fmt: skip
+        assert len(artists.lines(identify._residuals(found, few)[0].axes[0])) == drawn
+    pairs[0][0].nu[38:, 0] = np.nan  # 38 samples have 20 lines, 40 one more
+    for segment, _ in pairs:
+        segment.at = 2.0 * segment.at
+    ((f, p),) = map(points, artists.lines(identify._residuals(found, pairs)[0].axes[0]))
+    assert f == pytest.approx(10.0 / 40.0 * np.arange(1, 20)), 'measured at half the rate'
+    assert np.mean(p) == pytest.approx(1.0, abs=0.25)

@@ -124,6 +124,16 @@ def test_residuals_that_alternate_are_coloured_and_not_slow():
     assert [row['slow'] for row in rows] == pytest.approx([0.0081] * 6, abs=0.004)
 
 
+@pytest.mark.parametrize(('share', 'verdict'), [(0.035, 'white'), (0.07, 'coloured')])
+def test_a_little_autocorrelation_is_no_finding_however_certain(share, verdict):
+    white = np.random.default_rng(1).normal(size=(40001, 9))
+    e, segment = white[1:] - share * white[:-1], SimpleNamespace(nu=np.zeros((40000, 6)))
+    segment.at = np.arange(40000.0)
+    rows = whiteness([(segment, e)], 0.02)
+    assert [row['verdict'] for row in rows] == [verdict] * 6
+    assert max(row['p'] for row in rows) < 0.01 / 6
+
+
 def test_what_is_constant_has_the_power_of_its_square_and_a_sine_half_of_it():
     """The one lies below 1 Hz, the other one, at 5 Hz, above."""
     t, sizes = 0.02 * np.arange(2000), np.linspace(0.5, 3.0, 6)

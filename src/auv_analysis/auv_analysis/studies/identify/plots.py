@@ -108,8 +108,8 @@ def _inertia(rows: Sequence[Mapping[str, Any]]) -> Drawn:
         y = np.arange(len(some))
         value, low, high = (np.array([row[k] for row in some]) for k in ('M', 'M_low', 'M_high'))
         known = [row['verdict'] != 'not known' for row in some]
-        spread = np.where(known, [value - low, high - value], 0.0)
-        axes.errorbar(value, y, xerr=np.maximum(spread, 0.0), fmt='D', color=COLOURS[0],
+        spread = np.where(known, np.maximum([value - low, high - value], 0.0), 0.0)
+        axes.errorbar(value, y, xerr=spread, fmt='D', color=COLOURS[0],
                       markersize=4, capsize=2, label='identified')  # fmt: skip
         axes.plot([row['M_prior'] for row in some], y, 'o', mfc='none', color=GREY, label='prior')
         axes.axvline(0.0, color='black', linewidth=0.6)

@@ -20,10 +20,11 @@ from auv_dynamics.vehicle import DOFS
 
 VEHICLE, NAME = 'vehicle.yaml', 'identify'
 NARROW: Mapping[str, tuple[str, ...]] = {  # tables in a terminal, and what they leave out there
-    'coefficients': ('left', 'status'),
+    'coefficients': ('left', 'status', 'bootstrap_low', 'bootstrap_high', 'profile_low',
+                     'profile_high'),
     'inertia': tuple(f'Upsilon{k}' for k in ('', '_prior', '_low', '_high')),
     'predictions': ('linear', 'angular'),
-}
+}  # fmt: skip
 JUDGED = 0.5  # s: shorter horizons tell of noise rather than of the model
 PROFILED = (
     'Profile likelihoods: the rise of the cost where a coefficient is held and all others are '

@@ -111,8 +111,8 @@ def _energy(table: pa.Table) -> Drawn:
     right.set_xlabel('mean kinetic energy (J)')
     plots.logarithmic(right, 'x')
     right.margins(x=0.08)
-    for axes in (left, right):
-        axes.grid(axis='y', visible=False)
+    left.grid(axis='y', visible=False)
+    right.grid(axis='y', visible=False)
     title = 'Kinetic energy'
     caption = (
         f'{title}: shares of the components of the decomposition in its mean, equation (30), '

@@ -158,7 +158,7 @@ def write_comparison(
 def _counted(entries: Sequence[Entry], name: str) -> str:
     """'3 scenarios', or the only one by its name."""
     found = list(dict.fromkeys(getattr(entry, name) for entry in entries))
-    return f'{name} {found[0]}' if len(found) == 1 else f'{len(found)} {name}s'
+    return f'{name} {join(found)}' if len(found) == 1 else f'{len(found)} {name}s'
 
 
 def overview(table: pa.Table) -> Table:

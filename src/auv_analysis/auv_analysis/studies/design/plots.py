@@ -101,7 +101,7 @@ def _upsilon(document: Mapping[str, Any], M: np.ndarray) -> Drawn:
     figure = plotting.new_figure(3.4)
     grid = figure.subplots(1, 2)
     for i, (axes, (key, U)) in enumerate(zip(grid, pair.items(), strict=True)):
-        axes.imshow(sizes[key], cmap='Blues', vmin=0.0, vmax=top)
+        image = axes.imshow(sizes[key], cmap='Blues', vmin=0.0, vmax=top)
         for row, column in np.argwhere(sizes[key] > 1e-12):
             dark = sizes[key][row, column] > 0.6 * top
             text = f'{U[row, column]:.2g}'.replace('-', '−')
@@ -112,7 +112,7 @@ def _upsilon(document: Mapping[str, Any], M: np.ndarray) -> Drawn:
         axes.set_yticks(range(6), DOFS if i == 0 else [''] * 6)
         plotting.letter(axes, i, key)
     label = 'weight of the entry (free of units)'
-    figure.colorbar(grid[0].images[0], ax=grid, label=label, shrink=0.8)
+    figure.colorbar(image, ax=grid, label=label, shrink=0.8)
 
     caption = Maths(
         'Entries of Υ − I before and after the change, from ξ (columns) to ν (rows). The numbers '

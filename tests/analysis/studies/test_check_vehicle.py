@@ -177,6 +177,16 @@ def test_periods_are_those_of_a_free_oscillation(name, dof):
     assert mode['natural_frequency'] ** 2 == pytest.approx(mode['eigenvalue'])
 
 
+def test_a_coupled_motion_is_named_by_the_angle_that_has_most_of_it(written):
+    data = file_of('bluerov2_heavy')
+    data['rigid_body']['inertia'][0][1] = data['rigid_body']['inertia'][1][0] = 0.02
+    both = (
+        check_vehicle(one)['hydrostatics']['modes'] for one in ('bluerov2_heavy', written(data))
+    )
+    alone, found = ([modes[dof]['eigenvalue'] for dof in ('roll', 'pitch')] for modes in both)
+    assert found[0] < alone[0] < alone[1] < found[1], 'a coupling drives them apart'
+
+
 @pytest.mark.parametrize('name', NAMES)
 def test_frequencies_are_those_of_all_twelve_states(name):
     vehicle, small = load_vehicle(name), 1e-6
@@ -262,6 +272,8 @@ def test_limits_of_thrusters_stand_under_their_names():
     thrusters = load_vehicle('bluerov2_heavy').thrusters
     assert found['forward'] == thrusters.forward.tolist()
     assert found['reverse'] == thrusters.reverse.tolist()
+    assert found['matrix'] == thrusters.matrix.tolist()
+    assert found['names'] == list(thrusters.names)
 
 
 def test_rotors(capsys, approved):
@@ -338,8 +350,10 @@ def test_the_tables_carry_the_numbers(name, capsys):
     for warning in document['warnings']:
         assert f'warning: {warning}' in text
     assert ('thrusters, T has rank' in text) == (document['thrusters'] is not None)
-    print_check(document)
-    assert document['statement'] in capsys.readouterr().out
+    print_check(document | {'source': ''})
+    text = capsys.readouterr().out
+    assert document['statement'] in text
+    assert text.startswith(f'{name}: no source is given\n')
 
 
 def test_command_prints_tables_or_one_document(capsys, approved):
@@ -408,6 +422,7 @@ def test_poles_ahead_say_whether_a_vehicle_keeps_its_course(written):
     assert (only['verdict'], only['hint'][:15]) == ('unstable', 'the Munk moment')
     data['damping'] = {'linear': [0.0] * 6, 'quadratic': [0.0] * 6}
     at_rest = cruise(written(data), 0.0)
+    assert (at_rest['speed'], at_rest['speed_source']) == (0.0, 'given')
     assert (at_rest['verdict'], at_rest['hint']) == ('marginal', None)
     heavy_above = file_of('bluerov2') | {'added_mass': [20.0, 5.0, 5.0, 0.1, 0.1, 0.1]}
     heavy_above['rigid_body']['center_of_gravity'] = [0.0, 0.0, -0.02]
@@ -441,6 +456,7 @@ def test_what_turns_over_is_said(eigenvalue, turns):
     _hydrostatics_table(found, Console(file=out, width=120))
     assert ('unstable in pitch: the vehicle turns over' in out.getvalue()) is turns
     assert 'unstable in roll' not in out.getvalue()
+    assert 'not level at rest: 0 N m in roll, −367.9 N m in pitch' in out.getvalue()
 
 
 @pytest.mark.parametrize(

@@ -210,10 +210,10 @@ def _munk(vehicle: Vehicle) -> str | None:
 def _thrusters(thrusters: Thrusters) -> dict[str, Any]:
     """What is there, and how much of each degree of freedom it gives; None where it gives none."""
     lost = thrusters.unactuated()
-    much = 1e6 * (thrusters.forward.sum() + thrusters.reverse.sum())  # beyond any limit
 
     def largest(axis: np.ndarray) -> list[float]:
-        return [float(abs(axis @ thrusters.allocate(way * much * axis)[1])) for way in (-1, 1)]
+        far = axis / np.finfo(float).eps  # beyond any limit
+        return [float(abs(axis @ thrusters.allocate(tau)[1])) for tau in (-far, far)]
 
     axes = zip(DOFS, np.eye(6), strict=True)
     return {
@@ -231,7 +231,6 @@ def _thrusters(thrusters: Thrusters) -> dict[str, Any]:
 def _rotor(rotor: Rotor) -> dict[str, Any]:
     """What turns a thruster, None for what does not exist; N, V, s, rad/s."""
     curve = rotor.curve
-    second = rotor.omega > 0.0
     return {
         'curve': 'square law' if curve is None else curve.name or 'table of the file',
         'source': source_of(curve.name) if curve and curve.voltage else None,
@@ -240,10 +239,10 @@ def _rotor(rotor: Rotor) -> dict[str, Any]:
         'command_unit': None if curve is None else curve.unit,
         'voltage': rotor.voltage,
         'dead_band': list(rotor.dead_band),
-        'lag': None if second else rotor.lag,
+        'lag': None if rotor.omega else rotor.lag,
         'lag_at': rotor.lag_at or None,
-        'omega': rotor.omega if second else None,
-        'zeta': rotor.zeta if second else None,
+        'omega': rotor.omega or None,
+        'zeta': rotor.zeta if rotor.omega else None,
     }
 
 

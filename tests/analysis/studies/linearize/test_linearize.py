@@ -232,3 +232,5 @@ def test_poles_that_are_all_zero_are_told_as_such() -> None:
     found = modes(Made(A=np.zeros((2, 2)), states=('a', 'b')))
     assert [mode['pole'] for mode in found] == [[0.0, 0.0]] * 2
     assert [mode['mostly'] for mode in found] == ['a', 'b']
+    chain = modes(Made(A=np.diag([2.0, 3.0], 1), states=('a', 'b', 'c')))  # of integrators
+    assert [mode['pole'] for mode in chain] == [[0.0, 0.0]] * 3

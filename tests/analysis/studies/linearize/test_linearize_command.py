@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from auv_analysis import linearize
+from auv_analysis import linearize, load_scenario
 from auv_analysis.cli.main import main
-from auv_analysis.studies.linearize.modes import stability
+from auv_analysis.studies.linearize.modes import linear_models, stability
 
 
 @pytest.mark.usefixtures('unrendered')
@@ -43,6 +43,14 @@ def test_the_loops_of_a_scenario_as_a_table(tmp_path, capsys, approved):
     assert zeros == 2, 'roll and pitch: their restoring moments are compensated'
     assert (model['stable'], model['stability']) == (False, 'marginal')
     assert f'cl: 20 states, marginal, 2 of its {len(model["modes"])} modes neither grow' in text
+
+
+def test_all_models_are_of_one_point():
+    nu0, eta0 = [0.5, 0.1, -0.2, 0.01, 0.02, 0.03], [0.0, 0.0, 0.0, 0.1, -0.2, 0.3]
+    models = linear_models(load_scenario('case1'), ['cl', 'gvc'], nu0, eta0)
+    assert list(models) == ['open loop', 'cl', 'gvc']
+    for model in models.values():
+        assert_allclose(model.x0[:8], [*eta0[3:5], *nu0])
 
 
 @pytest.mark.parametrize(('rate', 'verdict'), [(-1, 'asymptotically stable'), (1e-3, 'unstable')])

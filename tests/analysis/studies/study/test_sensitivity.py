@@ -160,6 +160,8 @@ def test_loops_that_always_diverge_are_a_refusal_with_its_reason(monkeypatch, tm
     assert 'own gains' in own.refusal
     assert not own.rows
     assert (own.rollouts, found.rollouts) == (0, 0)
+    assert (own.failed, own.span) == ({}, 2.0)
+    assert found.span == pytest.approx(2.0**0.125)  # the last that was tried
     table = left_out_table([own])
     assert own.refusal in [cell.text for row in table.rows for cell in row]
     path = write_sensitivities(tmp_path, [own, found])
@@ -260,6 +262,8 @@ def test_wrong_input_is_refused():
         sensitivity(short(), 'gvc', span=1.0)
     with pytest.raises(InputError, match='nobody'):
         sensitivity(short(), 'nobody')
+    with pytest.raises(ValueError, match=r'expected sobol or morris, found .fast'):
+        sensitivity(short(), 'gvc', method='fast')
 
 
 def test_table_sentences_and_file_say_the_same(monkeypatch, tmp_path, approved):
@@ -295,6 +299,8 @@ def test_what_is_small_throughout_its_kind_is_no_rounding():
     found['effort.max.sway'] = np.ones(9)
     assert _reason(Kpi('effort.max', 'surge'), found).startswith('rounding')
     assert _reason(Kpi('effort.max', 'yaw'), found) == '', 'of the other half'
+    found['effort.max.surge'] = np.geomspace(1e-12, 0.5, 9)
+    assert _reason(Kpi('effort.max', 'surge'), found) == '', 'not throughout'
 
 
 def test_how_many_points_are_taken_where_nobody_says():

@@ -70,9 +70,10 @@ def test_the_measure_that_follows_the_gains_most_in_words() -> None:
         'it by about −58 %.'
     )
     for doubled, words in ((0.5, '+0.50'), (0.0, '+0')):
-        main |= {'doubled': doubled}
+        main |= {'doubled': doubled, 'ST': 1.04}  # estimated, as a share of the whole
         text = study._headline(found, 'velocity_error.rms', 'sway', main)
         assert text.endswith(f'about {words} %.')
+        assert ': k_D makes 100 % of its variance' in text
     main |= {'rank_high': 3, 'rank_low': 2, 'doubled': 12.0}
     found.method = 'morris'
     assert study._headline(found, 'velocity_error.rms', 'sway', main).endswith(
@@ -102,7 +103,8 @@ def test_sensitivities_of_nothing_that_is_drawn(tmp_path) -> None:
 def test_components_are_named_until_nearly_all_energy_is_told(shares, words: str) -> None:
     (sentence,) = study._energy('gvc', {'kinetic_energy': {'shares_percent': shares}})
     assert str(sentence.text) == f'Of the kinetic energy of gvc over the whole run, {words}'
-    assert [*study._energy('gvc', {'kinetic_energy': {'shares_percent': [0.0] * 6}})] == []
+    for none in ([0.0] * 6, None):
+        assert [*study._energy('gvc', {'kinetic_energy': {'shares_percent': none}})] == []
 
 
 def test_an_interval_beside_its_estimate_ends_there(tmp_path) -> None:

@@ -35,11 +35,12 @@ def modes(model: Linearization) -> list[dict[str, Any]]:
 
     """
     values, left, right = scipy.linalg.eig(model.A, left=True, right=True)
-    weights = np.abs(left.conj() * right)
-    weights /= np.maximum(weights.sum(axis=0), np.finfo(float).tiny)
+    tiny = np.finfo(float).tiny
+    weights = np.abs(left * right)
+    weights /= np.maximum(weights.sum(axis=0), tiny)
     smallest = NEGLIGIBLE * np.abs(values).max()
-    near = np.round(values / (smallest or 1.0))  # of equal poles the solver's rounding has no say
-    order = np.lexsort((weights.argmax(axis=0), near.imag, -near.real, np.abs(near)))
+    near = np.round(values / max(smallest, tiny))  # of equal poles rounding has no say
+    order = np.lexsort((weights.argmax(axis=0), -near.real, np.abs(near)))
     kept = [i for i in order if values[i].imag >= 0]
     return [_mode(complex(values[i]), weights[:, i], model.states, smallest) for i in kept]
 

@@ -383,12 +383,11 @@ def _deformed(kind: str, summary: Summary) -> Iterator[Sentence]:
     """Which component is deformed most, by how much of itself, and by which other."""
     what, cause, metric, units = DEFORMED[kind]
     largest, own = summary['coupling'][f'{kind}_max'], summary[metric]['max']
-    terms = [term for term in summary['coupling_terms'][kind] if term['share_percent'] is not None]
     ratios = [a / b if b > 0 else 0.0 for a, b in zip(largest, own, strict=True)]
     i = int(np.argmax(ratios))
-    mine = [term for term in terms if term['to'] == DOFS[i]]
-    if not mine or ratios[i] < SMALL:
+    if ratios[i] < SMALL:
         return
+    mine = [term for term in summary['coupling_terms'][kind] if term['to'] == DOFS[i]]
     main = max(mine, key=lambda term: term['share_percent'])
     text = f'The {what} of {DOFS[i]} is deformed by up to {number(largest[i])} {units[i // 3]}'
     text += f', where it reaches {number(own[i])} {units[i // 3]} by itself'

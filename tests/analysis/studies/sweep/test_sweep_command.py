@@ -1,6 +1,8 @@
 """`auv sweep`: one document, one line that says where, refused and diverged rollouts, own laws."""
 
 import json
+import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,6 +11,11 @@ import pytest
 from helpers.sweeps import CAMPAIGN, ROLLOUTS, SCENARIO, parts, rows, write_files
 
 from auv_analysis.cli.main import main
+from auv_analysis.simulation import simulate
+from auv_analysis.studies.sweep import engine
+from auv_analysis.studies.sweep.campaign import Campaign
+from auv_analysis.studies.sweep.engine import SweepStoppedError
+from auv_gvc_controller.laws.law import SHIPPED
 
 
 @pytest.fixture
@@ -37,6 +44,9 @@ def test_command_prints_one_document_and_says_where(command: Callable, files: Pa
     code, out, lines = command('--json', '--workers', '2')
     document = json.loads(out)
     assert (code, document['rows'], document['dataset']) == (0, 32, 'runs/small/rollouts')
+    assert [document[key] for key in ('campaign', 'folder', 'rollouts', 'rollouts_before')] == [
+        'small', 'runs/small', ROLLOUTS, 0,
+    ]  # fmt: skip
     assert document['controllers']['cl'] == {'ok': ROLLOUTS, 'diverged': 0, 'refused': 0}
     assert sorted(document['paths']) == [
         'controllers.*.k_D', 'setpoint.surge.offset', 'vehicle', 'vehicle.damping.linear[0]'
@@ -70,6 +80,37 @@ def test_campaign_of_the_folder_makes_the_same_rows(command: Callable, files: Pa
     assert rows(files / 'again').equals(rows(files / 'runs/small'))
 
 
+def test_a_sweep_that_is_stopped_says_how_it_goes_on(command, monkeypatch) -> None:
+    told: list[list[str]] = []
+    asked: list[tuple] = []
+    opened = engine.opened
+
+    def stopped(*_: object) -> None:
+        raise SweepStoppedError('interrupted')
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(engine, 'sweep', stopped)
+    monkeypatch.setattr(engine, 'opened', lambda *of: asked.append(of) or opened(*of))
+    monkeypatch.setattr(simulate, 'announce', lambda _, names: told.append(names))
+    monkeypatch.setattr(Campaign, 'own_laws', {'gvc': SHIPPED['gvc']})  # is not announced
+    again = 'the same command goes on from there'
+    for _ in range(2):
+        code, _, lines = command()
+        done = '0 of 16 rollouts are finished'
+        assert (code, lines[-1]) == (1, f'runs/small: interrupted; {done}, {again}')
+    assert told == [['cl']], 'one that goes on says nothing'
+    out = 'runs/small/unfinished'
+    again = f'the same command with --out {out}, without --overwrite, goes on from there'
+    assert command('--overwrite')[2][-1] == f'{out}: interrupted; {done}, {again}'
+    monkeypatch.setattr(engine, 'sweep', interrupted)  # for the second time
+    monkeypatch.setattr(os, '_exit', sys.exit)
+    code, _, lines = command('--overwrite', '--executor', 'threads', '--workers', '3')
+    assert (code, lines[-1]) == (1, f'{out}: interrupted; {again}')
+    assert asked == [(None, None, None)] * 3 + [('threads', None, 3)]
+
+
 @pytest.mark.parametrize('all_of_them', [False, True])
 def test_values_that_make_no_scenario_are_counted(command, all_of_them: bool, files: Path) -> None:
     masses = '[-1.0, 0.0]' if all_of_them else '[250.0, -1.0]'
@@ -82,7 +123,8 @@ def test_values_that_make_no_scenario_are_counted(command, all_of_them: bool, fi
     assert len(refused) == (4 if all_of_them else 2)
     assert all('rigid_body.mass' in table['reason'][i].as_py() for i in refused)
     assert all(table['kinetic_energy.mean'][i].as_py() is None for i in refused)
-    assert any(line.startswith(f'warning: {len(refused)} of 4 rows refused') for line in lines)
+    told = f'warning: {len(refused)} of 4 rows refused, the first: {table["reason"][refused[0]]}'
+    assert told in lines
     assert code == (1 if all_of_them else 0)
     assert json.loads(out)['rows'] == 4
     assert ('every rollout was refused' in lines[-1]) is all_of_them

@@ -123,6 +123,28 @@ def test_of_many_controllers_three_stand_side_by_side(simple: Drawn) -> None:
     assert caption.endswith(' pid: in influence.parquet.')
 
 
+def test_of_many_paths_the_six_that_matter_most_are_drawn(monkeypatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(plots.plots, 'save_figures', lambda _, drawn: drawn)
+    empty = dict.fromkeys(('influence', 'together', 'failures', 'indices'), ())
+    many = SimpleNamespace(measures=[], tables=empty | {'dependence': [{}]},
+                           most_influential=lambda: [*'abcdefgh'])  # fmt: skip
+    drawn = draw(many, tmp_path)
+    assert list(drawn) == [f'dependence_{i}' for i in range(1, 7)]
+    assert [one.args[1] for one in drawn.values()] == [*'abcdef']
+
+
+def test_of_many_rows_some_from_all_over_are_drawn(simple: Drawn, monkeypatch) -> None:
+    analysis, *_ = simple
+    (factor,) = (f for f in analysis.factors if f.path == DAMPING)
+    monkeypatch.setattr(plots, 'SAMPLE', 7)
+    figure, _, caption = plots._dependence(analysis, factor, main_measures(analysis)[:1])
+    dots = [points(x) for x in artists.lines(figure.axes[0]) if x.get_linestyle() == 'None']
+    for controller, (x, _) in zip(('gvc', 'cl'), dots, strict=True):
+        mine = analysis.rows_of(controller)
+        assert np.array_equal(x, factor.numbers[mine[: 7 * (len(mine) // 7) : len(mine) // 7]])
+    assert caption.endswith(' Points: at most 7 rows of each controller.')
+
+
 def test_dependence_shows_the_quantiles_along_its_path(simple: Drawn) -> None:
     analysis, figures, captions = simple
     factors = {f.path: f for f in analysis.factors}
@@ -223,6 +245,12 @@ def test_the_two_paths_that_matter_most_stand_in_their_cells(simple: Drawn) -> N
             expected = np.nan if row['median'] is None else row['median']
             assert value == pytest.approx(expected, nan_ok=True)
     assert f'each combination of {first.path} and {second.path}' in captions['together']
+    many = [row | {'controller': f'{row["controller"]}{k}'}
+            for k in (1, 2) for row in analysis.tables['together']]  # fmt: skip
+    tables = analysis.tables | {'together': many}
+    figure = plots._together(replace(analysis, tables=tables), main_measures(analysis)[:1])[0]
+    heads = [axes.get_title(loc='left') for axes in figure.axes if axes.images]
+    assert [head.partition(':')[0] for head in heads] == ['gvc1', 'cl1', 'gvc2']
 
 
 def test_failures_are_the_shares_of_their_rows(failing: Drawn) -> None:

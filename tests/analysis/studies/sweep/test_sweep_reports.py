@@ -151,11 +151,12 @@ def test_every_number_of_the_report_is_in_a_file(tmp_path: Path, campaign, known
 
 
 @pytest.mark.usefixtures('unrendered')
-def test_an_unfinished_sweep_says_so(tmp_path: Path, capsys) -> None:
+def test_an_unfinished_sweep_says_so(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
     out = make_sweep(tmp_path, SIMPLE, simple, range(0, 16, 3))
-    cli.main(['analyze', str(out), '--out', str(tmp_path / 'report')])
+    cli.main(['analyze', str(out)])
     assert 'note: not finished, 600 of 1600 rows are there' in capsys.readouterr().err
-    report = (tmp_path / 'report/report.html').read_text(encoding='utf-8')
+    report = (tmp_path / 'runs/analyze_simple/report.html').read_text(encoding='utf-8')
     assert 'The sweep is not finished: 600 of 1600 rows are there.' in report
 
 
@@ -177,7 +178,10 @@ def test_results_are_replaced_only_when_asked_and_the_rest_stays(tmp_path: Path,
     command = ['analyze', str(sweep), '--out', str(out)]
     cli.main(command)
     (out / 'notes.md').write_text('mine')
-    capsys.readouterr()
+    assert 'not finished' not in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        cli.main([*command, '--by', 'kinetic_energy'])
+    assert capsys.readouterr().err.startswith('--by: expected ')
     with pytest.raises(SystemExit) as end:
         cli.main(command)
     assert (end.value.code, len(capsys.readouterr().err.splitlines())) == (2, 1)

@@ -95,6 +95,33 @@ def test_the_reference_is_in_sight_where_all_others_cost_more() -> None:
     assert axes.get_xlim() == pytest.approx((0.97, 2.0))
 
 
+@pytest.mark.parametrize(('height', 'least'), [(199.5, 0.1), (200.5, 1.0)])
+def test_what_lies_far_off_is_out_of_sight(height: float, least: float) -> None:
+    tuning = Tuned()
+    for one in tuning.searches:
+        one.margins[:] = -1.0  # too fast
+    (axes,) = tune.trade_off(tuning)[0].axes
+    assert axes.get_xlim() == pytest.approx((0.97, 2.0)), 'nothing was found'
+    one, reference = tuning.searches[0], tuning.goal.reference
+    one.margins[1:3] = 1.0
+    one.evaluations.effort[1:3] = np.array([0.1, 3.0]) * reference.effort
+    one.evaluations.weighted_error[1:3] = np.array([height, 0.01]) * reference.weighted_error
+    (axes,) = tune.trade_off(tuning)[0].axes
+    assert axes.get_xlim() == pytest.approx((0.97 * least, 2.0))
+    assert axes.get_ylim() == (0.05, 200.0)
+
+
+@pytest.mark.parametrize(('largest', 'between'), [(90.0, True), (900.0, False)])
+def test_an_axis_of_errors_has_as_many_plain_ticks_as_it_has_room_for(largest, between) -> None:
+    axes = plotting.new_figure(2.0).subplots()
+    axes.plot([1.0, largest], [0.0, 1.0])
+    tune._scaled(axes, 'error')
+    axes.figure.canvas.draw()
+    ticks = [text.get_text() for text in axes.get_xticklabels()]
+    assert '10' in ticks
+    assert ('20' in ticks) == ('50' in ticks) == between
+
+
 def test_distributions_over_draws() -> None:
     tuning = Tuned()
     figure, title, _ = tune.distributions(tuning)
@@ -122,6 +149,7 @@ def test_a_measure_is_drawn_where_any_controller_has_it() -> None:
 
 def test_paired_ratios_are_of_the_same_draws() -> None:
     tuning = Tuned()
+    tuning.draws['cl_tuned'].weighted_error[3] = tuning.draws['gvc'].effort[5] = np.nan
     figure, title, _ = tune.paired(tuning)
     assert title == 'Paired ratios to gvc'
     for k, (axes, measure) in enumerate(
@@ -134,6 +162,7 @@ def test_paired_ratios_are_of_the_same_draws() -> None:
         upright = [line for line in axes.lines if len(set(line.get_xdata())) == 1]
         for place, name in enumerate(('cl_tuned', 'mine'), start=1):
             ratios = getattr(tuning.draws[name], measure) / getattr(tuning.draws['gvc'], measure)
+            ratios = ratios[np.isfinite(ratios)]  # of the draws that neither left
             found = {
                 x.get_xdata()[0] for x in upright if abs(np.mean(x.get_ydata()) - place) < 1e-9
             }

@@ -349,7 +349,7 @@ def _failures(analysis: Analysis) -> Drawn:
         bottom = np.zeros(len(groups))
         for word, colour in (('diverged', COLOURS[4]), ('refused', GREY)):
             failed = np.array([sum(r[word] for r in group) for group in groups.values()])
-            share = 100 * failed / np.maximum(counts, 1)
+            share = 100 * failed / counts
             axes.bar(range(len(groups)), share, bottom=bottom, color=colour, label=word)
             bottom += share
         _values_below(axes, list(groups))

@@ -75,7 +75,7 @@ def _law(axes: Axes, tuning: Tuning, name: str) -> float:
     front = _front(x, y)
     axes.plot(x, y, '.', color=colour, alpha=0.18, markersize=3, markeredgewidth=0)
     axes.plot(x[front], y[front], color=colour, drawstyle='steps-post', label=law)
-    return float(min(x[front][y[front] < HEIGHTS[1]], default=1.0))
+    return float(min(x[front][y[front] < HEIGHTS[1]], default=np.inf))
 
 
 def _controllers(axes: Axes, tuning: Tuning) -> None:
@@ -86,7 +86,7 @@ def _controllers(axes: Axes, tuning: Tuning) -> None:
         if name == reference:
             label = f'{name}, as given'
             axes.plot(*place, '*', color='black', markersize=12, zorder=6, label=label)
-        elif np.isfinite(place).all():
+        else:
             mark, colour = 'o' if name in tuning.laws else 'D', _look(tuning, name)['color']
             axes.plot(*place, mark, color=colour, markeredgecolor='black', markersize=7, zorder=5)
 

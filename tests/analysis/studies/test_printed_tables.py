@@ -55,7 +55,7 @@ def _vehicle(numbers) -> dict:
 
     mode = {'pole': [-0.5, 0.25], 'mostly': 'sway', 'time_constant': 2.5}
     return {
-        'name': 'v', 'source': 'made', 'M': [six() for _ in DOFS], 'N': six(),
+        'name': 'v', 'source': 'made [n.d.]', 'M': [six() for _ in DOFS], 'N': six(),
         'inertia': {'eigenvalues': six(), 'condition_number': next(numbers)},
         'statement': 'S', 'structural_zeros': {'delta_xi': ['yaw'], 'delta_pi': []},
         'couplings': [
@@ -122,7 +122,7 @@ def test_a_vehicle_that_is_checked(monkeypatch, approved) -> None:
     ]  # fmt: skip
     assert len(printed.tables) == 8
     for line in (
-        'v: made', f'condition number {document["inertia"]["condition_number"]:.0f}',
+        'v: made [n.d.]', f'condition number {document["inertia"]["condition_number"]:.0f}',
         'zero in every motion: yaw', 'zero in every motion: none',
         'weight 101.5 N, buoyancy 99.2 N: +2.25 N (+2.27 %); metacentric height 0.055 m',
         'not level at rest: 1.5 N m in roll, −2.5 N m in pitch',
@@ -149,7 +149,7 @@ def test_poles_of_models(monkeypatch, approved) -> None:
         {'pole': [-3.0, 0.0], 'damping_ratio': 1.0, 'natural_frequency': 3.0, 'time_constant': 0.33,
          'mostly': 'sway', 'part': 1.0},
     ]  # fmt: skip
-    model = {'modes': modes, 'states': list('abcd'), 'stability': 'unstable', 'drift': [0.0, 1e-3]}
+    model = {'modes': modes, 'states': list('abcd'), 'stability': 'unstable', 'drift': [0.0, -1e-3]}
     still = model | {'modes': modes[2:], 'stability': 'asymptotically stable', 'drift': [1e-12, 0]}
     document = {'models': {'cl': model, 'open': still}, 'left_out': ['delay', 'noise']}
     linearize.print_poles(document, printed.out)
@@ -178,9 +178,9 @@ def test_margins_of_controllers(monkeypatch, approved) -> None:
     ]  # fmt: skip
     found = {'axes': axes, 'period': 0.01, 'delay': 0.02, 'lag': 0.03, 'stable': True,
              'disk_margin': 1.0, 'together': 2.5, 'gain': 'k_D'}  # fmt: skip
-    linearize.print_margins(
-        {'cl': found, 'gvc': found | {'stable': False, 'together': 0.0}}, printed.out
-    )
+    unknown = found | {'disk_margin': None, 'together': None}
+    gvc = found | {'stable': False, 'together': 0.0}
+    linearize.print_margins({'cl': found, 'gvc': gvc, 'smc': unknown}, printed.out)
     assert printed.rows(0) == [
         {'axis': row['axis'], 'gain, dB': row['gain_margin_db'], 'phase, deg': row['phase_margin'],
          'delay, s': row['delay_margin'], 'crossover, rad/s': row['crossover'],
@@ -193,6 +193,7 @@ def test_margins_of_controllers(monkeypatch, approved) -> None:
     assert lines[1] == 'disk margin 1: 9.54 dB either way, or 53.1 deg, in all axes at once'
     assert lines[2] == 'all of k_D times 2.50 keeps 6 dB and 45 deg on every axis'
     assert lines[5] == 'all of k_D times no factor keeps 6 dB and 45 deg on every axis'
+    assert lines[6:] == [f'smc: stable {held}']
 
 
 @pytest.mark.parametrize(('alpha', 'decibel'), [(0.5, '4.44'), (2.0, 'inf'), (2.5, 'inf')])

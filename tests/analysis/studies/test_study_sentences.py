@@ -354,11 +354,29 @@ def test_findings_of_a_tuning() -> None:
         '−0.20 % away, and cl_tuned is no fair comparison.'
     )
     assert 'gvc_tuned (0.500 times) is ahead of gvc (ratios' in lost[2]
-    none = Tuned(reached=False)
-    none.laws['gvc_tuned'].best.reached = False
-    assert [s.text[:25] for s in tune.findings(none)][:2] == [
-        'No gains of gvc that were', 'No gains of cl that were ',
-    ]  # fmt: skip
+    for others, begin in (
+        (False, ['No gains of gvc that were', 'No gains of cl that were ']),
+        (True, ['At the effort of gvc (50.', 'No gains of gvc that were']),
+    ):
+        none = Tuned(reached=others)
+        none.laws['gvc_tuned'].best.reached = False
+        assert [s.text[:25] for s in tune.findings(none)][:2] == begin
+
+
+def test_what_was_searched_without_reaching_equality_has_no_least() -> None:
+    about = {'low': 0.5, 'high': 40.0, 'times_inertia': True}
+    search = {
+        'searched': {'k_D': about, 'Lambda': about | {'times_inertia': False}},
+        'structure': 'mass',
+        'evaluations': 9,
+        'measures': {'effort': 3.0, 'error': 2.0},
+    }
+    controllers = {'gvc': {}, 'cl': {'searches': [search | {'reached': x} for x in (True, False)]}}
+    facts = {'controllers': controllers, 'index': 'error', 'equal': 'effort'}
+    table = tune._searched(Results('tune', facts))
+    assert [row[-1].value for row in table.rows] == [2.0, 2.0, None, None]
+    stands = {row[5].text for row in table.rows}
+    assert stands == {'times M_ii of each axis', 'itself'}
 
 
 def test_all_that_a_tuning_draws_is_explained() -> None:
@@ -490,6 +508,8 @@ def test_values_of_a_campaign_in_words() -> None:
     assert sweep._said({'uniform': {'from': 1.0, 'to': 3.0}}) == 'uniform: from 1, to 3'
     assert sweep._said(list(range(60))).endswith('…')
     assert len(sweep._said(list(range(60)))) == 79
+    assert sweep._said(['a' * 80]) == 'a' * 80
+    assert sweep._said(['a' * 81]) == f'{"a" * 78}…'
 
 
 def test_the_values_at_which_most_rows_fail_come_first() -> None:

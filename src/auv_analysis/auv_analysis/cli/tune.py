@@ -84,7 +84,7 @@ def _request(options: argparse.Namespace, scenario: Scenario) -> Request:
     check_hold(scenario, options.hold)
     reference = _reference(scenario, options.reference)
     own = scenario.controller(reference)['law']
-    laws = options.law or [law for law in LAWS if law != own]
+    laws = options.law or LAWS
     if own in LAWS:
         laws = [own, *laws]
     return Request(

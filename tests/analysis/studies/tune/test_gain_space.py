@@ -100,6 +100,22 @@ def test_every_law_starts_from_the_same_two_points(tmp_path, reference: str) -> 
             np.testing.assert_allclose(near, own)
 
 
+def remarks(space: GainSpace, x: np.ndarray) -> list[str]:
+    nothing = Measures(*np.zeros((len(Measures._fields), 1)))
+    none = np.zeros(0)
+    best = Optimum(space, x, nothing, True, None, none, nothing, none, none)
+    return TunedLaw(space.law, best, ()).remarks(30.0)
+
+
+def test_an_adaptation_that_acts_in_one_axis_is_none_without_effect() -> None:
+    for law, structure in (('gvc', 'diagonal'), ('pid', 'mass')):  # that has no adaptation
+        space = space_of(law, structure)
+        x = (space.low + space.high) / 2
+        if law == 'gvc':
+            x[:6], x[18:23], x[23] = np.log([12.0, 0.1, 5.0])
+        assert remarks(space, x) == []
+
+
 @pytest.mark.parametrize(
     ('Gamma', 'k_D', 'words'),
     [
@@ -111,11 +127,6 @@ def test_every_law_starts_from_the_same_two_points(tmp_path, reference: str) -> 
 )
 @pytest.mark.parametrize('law', ['gvc', 'cl'])
 def test_a_bound_and_an_adaptation_without_effect_are_remarked_on(law, Gamma, k_D, words) -> None:
-    space = space_of(law, 'inertia')
-    x = np.log([k_D, 1.0, 1.0, Gamma])
-    nothing = Measures(*np.zeros((len(Measures._fields), 1)))
-    none = np.zeros(0)
-    best = Optimum(space, x, nothing, True, None, none, nothing, none, none)
-    found = TunedLaw(law, best, ()).remarks(30.0)
+    found = remarks(space_of(law, 'inertia'), np.log([k_D, 1.0, 1.0, Gamma]))
     assert len(found) == len(words)
     assert all(word in text for word, text in zip(words, found, strict=True))

@@ -9,11 +9,13 @@ from helpers.tunings import DIAGONAL, GVC, scenario
 
 from auv_analysis import simulate
 from auv_analysis.simulation.simulate import DivergedError
+from auv_analysis.studies.optimise import Search
 from auv_analysis.studies.tune import results as tuning
 from auv_analysis.studies.tune import search as searching
 from auv_analysis.studies.tune.cost import Measures, measures_of_run, of_each
 from auv_analysis.studies.tune.gain_space import make_space
 from auv_analysis.studies.tune.perturbations import Perturbations, Spread, perturbed
+from auv_analysis.studies.tune.report import FAIR
 from auv_analysis.studies.tune.results import _checked, _evaluations, tune
 from auv_analysis.studies.tune.search import Goal, Request, TunedLaw, search, tuned
 from auv_dynamics.files.errors import FailedError, InputError
@@ -39,6 +41,71 @@ def bowl(gains: dict[str, np.ndarray]) -> Measures:
 
 def goal(equal: str, error: float, effort: float, tolerance: float = 1e-3) -> Goal:
     return Goal(equal, 'error', measures(np.array([error]), np.array([effort])), tolerance)
+
+
+def test_what_diverges_is_far_from_equal_and_from_good() -> None:
+    found = measures(*np.array([[np.nan, np.inf, 0.0, 8.0], [np.nan, np.inf, 0.0, 1.5]]))
+    logs = np.array([[50.0, 50.0, -50.0, np.log(2.0)], [50.0, 50.0, -50.0, -np.log(2.0)]])
+    np.testing.assert_allclose(goal('effort', 4.0, 3.0).logs(found), logs)
+    np.testing.assert_allclose(goal('error', 4.0, 3.0).logs(found), logs[::-1])
+
+
+JUDGED = [  # objective, equality, margin of the rate, stage
+    (2.0, 0.0, 1.0, 'global'), (0.5, 0.0, -0.01, 'refine'), (0.4, 0.0, 1.0, 'gradient'),
+    (0.9, 0.00995, 1.0, 'refine'), (0.1, 0.00996, 1.0, 'refine'), (0.95, -0.01003, 0.0, 'refine'),
+    (0.2, -0.0102, 1.0, 'global'), (9.0, 0.02, -0.01, 'refine'), (9.0, -0.0201, 1.0, 'gradient'),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ('shift', 'best', 'reached'), [(0.0, 3, True), (-0.03, 4, False), (0.03, 6, False)]
+)
+def test_the_best_is_equal_slow_enough_and_evaluated_as_a_point(shift, best, reached) -> None:
+    """With e^0.00995 - 1 and 1 - e^-0.01003 within 0.01, and e^0.00996 - 1 beyond."""
+    *columns, stages = zip(*JUDGED, strict=True)
+    logs, batches = np.array(columns), []
+    logs[1] += shift
+
+    def values(x: np.ndarray) -> np.ndarray:
+        batches.append(measures(x[:, 0], 10.0 + x[:, 0]))
+        return logs if len(x) == len(JUDGED) else x[:, 0] * [[3.0], [2.0], [1.0]]
+
+    solver = Search(values, np.array([-1.0]), np.array([9.0]), ('eq', 'ineq'))
+    solver.evaluate(np.arange(len(JUDGED), dtype=float)[:, None], stages)
+    found = searching._best(SPACE, goal('effort', 1.0, 1.0, tolerance=0.01), solver, batches)
+    assert (found.x.tolist(), found.reached) == ([best], reached)
+    assert found.measures.effort.tolist() == [10.0 + best]
+    assert found.price == (pytest.approx(1.5) if reached else None)
+    count = len(JUDGED) + 3 * reached  # a point of its own, and one on either side
+    sizes = (found.points, found.evaluations.error, found.margins, found.stages)
+    assert [len(values) for values in sizes] == [count] * 4
+
+
+def test_a_price_is_that_of_the_gains_that_are_free() -> None:
+    slopes = np.array([[1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0], [0.0] * 4])
+    solver = Search(lambda x: slopes @ x.T, np.zeros(4), np.ones(4), ('eq', 'ineq'))
+    x = np.array([0.0, 0.5, 1.0, 0.25])
+    assert searching._price(solver, x) == pytest.approx((2 * 6 + 4 * 8) / (6**2 + 8**2))
+    slopes[1] = 0.0
+    assert searching._price(solver, x) is None
+
+
+def test_a_search_is_as_wide_as_the_report_says(monkeypatch) -> None:
+    begun: list = []
+
+    def run(solver: Search, points: np.ndarray, rounds) -> np.ndarray:
+        begun.append((points, rounds))
+        solver.evaluate(points, ['global'] * len(points))
+        return points[0]
+
+    monkeypatch.setattr(Search, 'run', run)
+    starts = [(SPACE.low + 2 * SPACE.high) / 3, (2 * SPACE.low + SPACE.high) / 3]
+    search(SPACE, bowl, goal('effort', 0.25, 3.0), points=4, seed=0, starts=starts)
+    ((points, ((first, few), (last, many))),) = begun
+    np.testing.assert_array_equal(points[:2], starts)
+    assert len(points) == 2 + 4
+    assert f'{few} gradients from each of the best {first} points and {many} from' in FAIR
+    assert f'from the best {last} of these' in FAIR
 
 
 @pytest.mark.parametrize('seed', [0, 1])
@@ -187,10 +254,14 @@ def test_six_numbers_begin_at_the_best_multiple_of_the_diagonal(tmp_path) -> Non
     base = scenario(tmp_path, {'gvc': GVC}, vehicle='rexrov', duration=0.1)
     how = 'effort', 'error', 1e-3, 'diagonal', 'continuous'
     request = Request(base, 'gvc', ('gvc',), *how, 0, 1)
-    mass, diagonal = tuned(request, 'gvc', Goal.of(request)).searches
+    advanced: list[int] = []
+    found = tuned(request, 'gvc', Goal.of(request), lambda: advanced.append(1))
+    mass, diagonal = found.searches
+    assert advanced == [1, 1]
     assert (mass.space.structure, diagonal.space.structure) == ('mass', 'diagonal')
     begun = diagonal.space.nearest(mass.space.entry(mass.x))
     assert np.abs(diagonal.points[:3] - begun).max(axis=1).min() < 1e-12
+    assert sum(diagonal.stages == 'global') == 3, 'and at no point of a sequence'
 
 
 @pytest.mark.usefixtures('brief')
@@ -266,9 +337,14 @@ def test_a_reference_that_diverges_is_nothing_to_equal(tmp_path) -> None:
         Goal.of(request)
 
 
-def test_a_reference_that_has_nothing_to_do_is_refused(tmp_path) -> None:
+def test_a_reference_that_has_nothing_to_do_is_refused(tmp_path, monkeypatch) -> None:
     base = scenario(tmp_path, {'gvc': GVC}, setpoint={}, disturbance=[], duration=0.05)
     request = Request(base, 'gvc', ('gvc',), 'effort', 'error', 1e-3, 'scalar', 'continuous', 0, 1)
     expected = 'controllers.gvc: expected a reference with effort and error, found effort 0, error'
     with pytest.raises(InputError, match=expected):
         Goal.of(request)
+    for error, effort in ((0.0, 2.0), (3.0, 0.0)):
+        made = measures(np.array([error]), np.array([effort]))
+        monkeypatch.setattr(searching, 'measured', lambda *_, made=made: made)
+        with pytest.raises(InputError, match=f'found effort {effort:g}, error {error:g}'):
+            Goal.of(request)

@@ -1,8 +1,10 @@
 """`auv tune`: its folder, its document, and one line for what it cannot take."""
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace as Made
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -14,11 +16,13 @@ from helpers.tunings import GVC, SAME_CL, write
 from auv_analysis import load_scenario, simulate
 from auv_analysis.cli import main, tune
 from auv_analysis.metrics.quantities import COSTS
+from auv_analysis.output.folder import sha256_of, write_manifest
 from auv_analysis.studies.tune import search as searching
 from auv_analysis.studies.tune.cost import measures_of_run
 from auv_analysis.studies.tune.gain_space import STRUCTURES
 from auv_analysis.studies.tune.perturbations import Perturbations, Spread, monte_carlo
 from auv_analysis.studies.tune.report import FAIR
+from auv_analysis.studies.tune.search import Request
 
 FILES = {'tune.json', 'scenario.yaml', 'vehicle.yaml', 'search.parquet', 'monte_carlo.parquet',
          'numbers.parquet', 'report.html', 'figures', 'manifest.json'}  # fmt: skip
@@ -79,7 +83,32 @@ def test_folder_document_and_files_agree(command: Callable, tmp_path: Path, appr
 def test_without_law_every_shipped_one_is_tuned_the_own_first(tmp_path: Path) -> None:
     scenario = load_scenario(write(tmp_path, {'gvc': GVC}))
     options = main.parser(['tune']).parse_args(['tune', 's.yaml'])
-    assert tune._request(options, scenario).laws == ('gvc', 'cl', 'pid', 'smc')
+    assert tune._request(options, scenario) == Request(
+        scenario, 'gvc', ('gvc', 'cl', 'pid', 'smc'), 'effort', 'weighted_error', 0.001, 'best',
+        'continuous', 0, len(os.sched_getaffinity(0)),
+    )  # fmt: skip
+    assert options.samples == 256
+
+
+def test_the_first_gvc_is_the_reference_and_a_law_of_ones_own_is_not_tuned() -> None:
+    laws = {'one': 'cl', 'slow': 'gvc', 'fast': 'gvc', 'mine': 'module:Law'}
+    controllers = {name: {'law': law} for name, law in laws.items()}
+    scenario = Made(controllers=controllers, controller=controllers.__getitem__, sampled=[])
+    found = []
+    for asked in (['--law', 'cl', '--law', 'gvc', '--law', 'cl'], ['--reference', 'mine'],
+                  ['--reference', 'one', '--law', 'smc']):  # fmt: skip
+        options = main.parser(['tune']).parse_args(['tune', 's.yaml', *asked])
+        request = tune._request(options, scenario)
+        found.append((request.reference, request.laws))
+    assert found == [
+        ('slow', ('gvc', 'cl')), ('mine', ('gvc', 'cl', 'pid', 'smc')), ('one', ('cl', 'smc')),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize('samples', ['0', '10', '100000'])
+def test_there_may_be_no_draws_or_enough(samples: str) -> None:
+    options = main.parser(['tune']).parse_args(['tune', 's.yaml', '--samples', samples])
+    assert options.samples == int(samples)
 
 
 def _equal(document: dict, measure: str, tolerance: float) -> None:
@@ -182,14 +211,16 @@ def test_same_seed_same_document_another_seed_another(command: Callable) -> None
 @pytest.mark.usefixtures('unrendered')
 def test_equal_error_and_no_draws(command: Callable, tmp_path: Path) -> None:
     write(tmp_path, {'gvc': GVC, 'cl': SAME_CL}, duration=1.0)
-    arguments = ('--equal', 'error', '--index', 'mean', '--samples', '0')
+    arguments = ('--equal', 'error', '--index', 'mean', '--samples', '0', '--out', 'mine')
     code, out, _ = command(*QUICK, *arguments, '--json')
     document = json.loads(out)
     assert (code, document['monte_carlo']) == (0, None)
     _equal(document, 'error', 1e-3)
     effort = {n: e['measures']['effort'] for n, e in document['controllers'].items()}
     assert effort['gvc_tuned'] <= effort['gvc'] * 1.001
-    assert not (tmp_path / 'runs/tune_small/monte_carlo.parquet').exists()
+    assert json.loads((tmp_path / 'mine/tune.json').read_text()) == document
+    assert not (tmp_path / 'mine/monte_carlo.parquet').exists()
+    assert not (tmp_path / 'runs').exists()
 
 
 @pytest.mark.usefixtures('unrendered')
@@ -197,14 +228,21 @@ def test_scenario_without_gvc_needs_a_reference(command: Callable, tmp_path: Pat
     write(tmp_path, {'cl': SAME_CL}, duration=0.5)
     code, _, lines = command(*QUICK)
     assert (code, len(lines)) == (2, 1)
-    assert 'controllers: expected a controller of law gvc, or --reference' in lines[0]
+    expected = 'controllers: expected a controller of law gvc, or --reference with another one'
+    assert f'{expected}, found cl' in lines[0]
     code, out, _ = command('--reference', 'cl', '--law', 'cl', '--samples', '0', '--json')
     assert code == 0
     [(name, entry)] = [
         found for found in json.loads(out)['controllers'].items() if found[1]['tuned']
     ]
     assert name == 'cl_tuned'
-    assert entry['structure'] in {'mass', 'scalar'}
+    searches = {search['structure']: search for search in entry['searches']}
+    assert list(searches) == ['scalar', 'mass']
+    best = min(searches.values(), key=lambda one: one['measures']['weighted_error'])
+    assert all(search['reached'] for search in searches.values())
+    assert [entry[key] for key in ('structure', 'measures')] == [
+        best[key] for key in ('structure', 'measures')
+    ]
 
 
 @pytest.mark.long
@@ -223,7 +261,10 @@ def test_effort_out_of_reach_is_said_plainly(command: Callable, tmp_path: Path) 
     ('arguments', 'match'),
     [
         (('--reference', 'none'), 'controllers: expected one of gvc, cl, found none'),
-        (('--samples', '3'), '--samples: expected 0 for none, or a whole number from 10'),
+        (('--samples', '9'), '--samples: expected 0 for none, or a whole number from 10 to 100000'),
+        (('--samples', '-20'), 'to 100000, found -20'),
+        (('--samples', '100001'), 'to 100000, found 100001'),
+        (('--samples', 'ten'), 'to 100000, found ten'),
         (('--tolerance', '0.0'), '--tolerance: expected a number above 0, below 0.1, found 0.0'),
         (('--tolerance', 'nan'), '--tolerance: expected a finite number'),
         (('--seed', '-1'), '--seed: expected a whole number from 0'),
@@ -237,6 +278,13 @@ def test_wrong_options_are_one_line(command, arguments, match, tmp_path: Path) -
     assert (code, len(lines)) == (2, 1)
     assert match in lines[0]
     assert not (tmp_path / 'runs').exists()
+
+
+def test_the_scenario_that_is_read_is_never_replaced(command: Callable, tmp_path: Path) -> None:
+    write_manifest(tmp_path, {'s.yaml': sha256_of(tmp_path / 's.yaml')})
+    code, _, lines = command(*QUICK, '--out', '.', '--overwrite')
+    assert (code, len(lines)) == (2, 1)
+    assert 's.yaml' in lines[0]
 
 
 def test_actuators_need_sampling(command: Callable, tmp_path: Path) -> None:

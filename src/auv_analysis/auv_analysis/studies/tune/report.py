@@ -201,7 +201,7 @@ def _searched(results: Results) -> Table:
                 rows.append({
                     'controller': name,
                     'structure': search['structure'],
-                    'gain': symbol(gain),
+                    'gain': gain,
                     'low': (*at, 'searched', gain, 'low'),
                     'high': (*at, 'searched', gain, 'high'),
                     'times': times,

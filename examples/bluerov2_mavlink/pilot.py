@@ -56,7 +56,7 @@ class Pilot:
         """Take the vehicle, or let it go: neutral and disarmed."""
         arming = now - self._asked.get('arm', -AGAIN) < AGAIN
         self._disarming = not on and (self.armed or (self.wanted and arming))
-        self._end(0 if on else MOST)
+        self._end(MOST)
         self.wanted, self.why = on, '' if on else why
         self._since, self._heard = now, None
 
@@ -66,7 +66,7 @@ class Pilot:
             return
         armed = self._asked.get('arm', -1) > self._asked.get('disarm', -1)
         self._acknowledged = now
-        if self.mode is not None and armed != self.armed and (armed or self._disarming):
+        if armed != self.armed and (armed or self._disarming):
             self.armed, self._disarming = armed, self._disarming and armed
 
     def vehicle(self, armed: bool, mode: int, now: int) -> str:
@@ -81,7 +81,7 @@ class Pilot:
             return self.let_go('disarmed by the vehicle or by somebody else')
         if self.wanted and self._had_mode and mode != MANUAL:
             return self.let_go(f'mode {mode} set by somebody else')
-        self._had_mode = self._had_mode or (self.wanted and mode == MANUAL)
+        self._had_mode = self._had_mode or mode == MANUAL
         return ''
 
     def motors(self, at_rest: bool) -> None:
@@ -158,9 +158,9 @@ class Pilot:
         return Deed(arm, axes=axes)
 
     def _end(self, limit: int) -> None:
-        """Forget the command; what this hand has left in the vehicle is made neutral."""
+        """Begin anew; what this hand has left in the vehicle is made neutral."""
         self._given, self._limit = 0, limit if self._holds else 0
-        self._axes, self._had_mode, self._holds = NEUTRAL, False, False
+        self._had_mode = self._holds = False
 
     def _may_ask(self, what: str, now: int, again: int = AGAIN) -> bool:
         if now - self._asked.get(what, -again) < again:

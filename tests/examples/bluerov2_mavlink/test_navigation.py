@@ -109,7 +109,7 @@ def test_boot_times_that_fall_back_far_are_of_another_boot() -> None:
     with pytest.raises(RestartedError, match='fell back from 5000 ms to 3999 ms'):
         navigation.position(position(3999))
     navigation.reset()
-    assert navigation.position(position(10)) is None, 'its attitude is forgotten'
+    assert navigation.position(position(5010)) is None, 'its attitude is forgotten'
 
 
 def test_offsets_agree_as_far_as_the_ways_may_have_been_uneven() -> None:

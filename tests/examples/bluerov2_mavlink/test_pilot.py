@@ -57,6 +57,9 @@ def test_a_wrench_counts_up_to_its_limit_and_is_sent_at_once_or_again_and_again(
     assert (pilot.is_fed(START + 2 + FED), pilot.is_fed(START + 3 + FED)) == (True, False)
     assert pilot.due(START + 3 + FED, True, fresh=True) == Deed()
     assert pilot.due(START + 2 + FED + KEEP_ALIVE, True) == Deed(axes=NEUTRAL)
+    unheard = taken()
+    unheard.silence()
+    assert unheard.due(START + KEEP_ALIVE, False) == Deed(axes=NEUTRAL)
 
 
 def test_silence_beyond_its_limit_disarms_until_a_wrench_comes() -> None:
@@ -81,6 +84,11 @@ def test_without_any_wrench_silence_begins_when_it_is_asked() -> None:
     pilot.vehicle(True, MANUAL, START)  # armed by somebody else
     assert pilot.due(START + DISARM, True) == Deed(axes=NEUTRAL)
     assert pilot.due(START + DISARM + 1, True) == Deed(False)
+    again = taken()
+    again.want(True, START + 1)
+    assert (again.is_fed(START + 1), again.commands) == (False, True)
+    assert again.due(START + 1 + KEEP_ALIVE, False) == Deed(), 'it holds nothing any more'
+    assert again.due(START + 1 + DISARM, True) == Deed(axes=NEUTRAL)
 
 
 def test_it_asks_for_mode_and_arms_when_ready_and_not_too_often() -> None:
@@ -92,9 +100,9 @@ def test_it_asks_for_mode_and_arms_when_ready_and_not_too_often() -> None:
     found = [pilot.due(START + after, True) for after in (0, AGAIN - 1, AGAIN)]
     assert found == [Deed(mode=True), Deed(), Deed(mode=True)]
     pilot.vehicle(False, MANUAL, START + AGAIN)
-    assert pilot.due(START + AGAIN, False) == Deed(), 'no input before it is ready'
-    assert pilot.due(START + AGAIN, True) == Deed(axes=NEUTRAL), 'nor armed without a wrench'
+    assert pilot.due(START + AGAIN, True) == Deed(axes=NEUTRAL), 'not armed without a wrench'
     pilot.command(PUSH, START + AGAIN)
+    assert pilot.due(START + AGAIN, False) == Deed(), 'nor before it is ready'
     armed = [pilot.due(START + AGAIN + after, True).arm for after in (0, AGAIN - 1)]
     pilot.command(PUSH, START + 2 * AGAIN)
     assert [*armed, pilot.due(START + 2 * AGAIN, True).arm] == [True, None, True]
@@ -116,13 +124,20 @@ def test_what_somebody_else_takes_is_left_with_few_neutral_inputs(armed, mode, s
     assert pilot.vehicle(False, ALT_HOLD, START) == '', 'no more of ours'
     pilot.want(True, START)
     assert pilot.vehicle(True, ALT_HOLD, START) == '', 'the mode is anew to be had'
+    steered = taken()
+    steered.let_go('another pilot')
+    assert (steered.commands, steered.letting_go) == (False, True)
+    silent = taken()
+    assert silent.due(START + DISARM + 1, True).arm is False
+    assert silent.vehicle(True, ALT_HOLD, START + DISARM + 1) != ''
+    assert sent(silent, START + 2 * DISARM)[0] == [], 'somebody else may have it armed'
 
 
 def test_asked_to_let_go_it_disarms_until_the_vehicle_is_and_its_motors_rest() -> None:
     pilot = taken()
     pilot.want(False, START)
-    disarms, neutral = sent(pilot, START + LETTING_GO, 18)
-    assert (disarms, neutral) == ([0, 8, 16], [*range(0, 18, 2)])
+    disarms, neutral = sent(pilot, START + LETTING_GO, 2 * LEAST)
+    assert (disarms, neutral) == ([0, 8], [*range(0, 2 * LEAST, 2)])
     pilot.motors(False)
     assert pilot.vehicle(False, MANUAL, START) == ''
     assert pilot.letting_go
@@ -139,6 +154,10 @@ def test_asked_to_let_go_it_disarms_until_the_vehicle_is_and_its_motors_rest() -
     never.want(True, START)
     never.want(False, START)
     assert (never.letting_go, sent(never, START)) == (False, ([], []))
+    never.want(True, START)
+    never.vehicle(True, MANUAL, START)  # armed by somebody else
+    never.want(False, START)
+    assert never.letting_go
 
 
 @pytest.mark.parametrize(('later', 'disarms'), [(AGAIN - 1, [0]), (AGAIN, [])])
@@ -162,6 +181,7 @@ def test_an_acknowledgement_is_newer_than_a_heartbeat_on_its_way(later, counts) 
     sent(gone, START + AGAIN, 1)
     gone.acknowledged(START + AGAIN)
     assert not gone.armed
+    assert sent(gone, START + 2 * AGAIN, 12)[0] == []
     gone.vehicle(True, MANUAL, START + AGAIN + later)
     assert gone.armed == counts
 

@@ -30,7 +30,7 @@ from auv_analysis.bag.writer import BagWriter
 from auv_analysis.cli import main, scenario_runs
 from auv_analysis.cli.main import COMMANDS
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
-from auv_analysis.output.folder import SWEEP, sha256_of, write_manifest
+from auv_analysis.output.folder import SWEEP, listed_in, paths_in, sha256_of, write_manifest
 from auv_analysis.report.verdict import FAILED
 from auv_dynamics.files.shipped import shipped
 
@@ -263,6 +263,26 @@ def test_simulate_prints_one_document_and_leaves_its_files(offset, options, fold
     left = {'scenario.yaml', 'vehicle.yaml', 'gvc.npz', 'summary.json', 'manifest.json'}
     report = {'report.html', 'figures', 'numbers.parquet'}
     assert {path.name for path in results.iterdir()} == (left if options else left | report)
+    assert {*paths_in(results)} == {*listed_in(results)}, 'else it could not be replaced'
+
+
+def test_without_a_report_runs_are_compared_and_remarked_on_as_well(folder, capsys) -> None:
+    slow = '60}, slow: {law: gvc, k_D: 6, k_I: 1, Lambda: 0.8, Gamma: 60}}'
+    text = SHORT.replace('OFFSET', '0.5').replace('GAIN', '12').replace('60}}', slow)
+    Path('two.yaml').write_text(text.replace('herman2018_neutral', 'bluerov2'))
+    assert _exit_code('simulate', 'two.yaml', '--no-report') == 0
+    said = capsys.readouterr().err
+    assert 'against slow, gvc has ' in said
+    for name in ('gvc', 'slow'):
+        assert f'note: {name}: pitch (up to ' in said
+
+
+def test_a_hold_that_actuators_do_not_take_is_refused_in_one_line(folder, capsys) -> None:
+    text = SHORT.replace('OFFSET', '0.5').replace('GAIN', '12')
+    Path('taken/short.yaml').write_text(f'{text}actuators: {{limit: 100.0}}\n')
+    code = _exit_code('simulate', 'taken/short.yaml')
+    captured = capsys.readouterr()
+    _is_refusal(code, captured.out, captured.err, '--hold zoh', folder)
 
 
 @pytest.mark.parametrize('option', [

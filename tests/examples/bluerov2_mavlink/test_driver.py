@@ -16,6 +16,7 @@ from helpers.mavlink_relay import Relay, fork_program, free_port, start_program
 from helpers.node_processes import PATIENCE, Peer, fresh_domain, parameters, stop
 from helpers.nodes_in_process import program
 from helpers.patience import FACTOR, patience
+from navigation import Exchange
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from std_srvs.srv import SetBool
 from udp import UdpPort
@@ -283,8 +284,18 @@ def test_every_parameter_is_heard_and_nothing_is_armed_unasked(monkeypatch) -> N
         with pytest.raises(BadMessageError, match='wrench: age'):
             node._on_wrench(now + 2 * NANOSECONDS, strong)
         node._link.differences += ['one', 'another']
+        node._link.clock.add(Exchange(1_000_000, 7, 4_000_000))
+        node._link.inputs, node._link.voltage, node._link.gain_from = (1501, 1502), 15.5, 'told'
+        node._link.refused, node._port.broken, node._link.pilot.mode = 3, 4, 2
         node._report()
-        assert node.graph.facts['differs'] == 'one; another'
+        facts = node.graph.facts
+        assert (facts['differs'], facts['inputs']) == ('one; another', '(1501, 1502)')
+        assert (facts['time uncertain by (s)'], facts['battery (V)']) == (0.0015, 15.5)
+        assert (facts['MAVLink refused'], facts['MAVLink broken'], facts['mode']) == (3, 4, 2)
+        assert (facts['pilot gain'], facts['vehicle heard'], facts['armed']) == (
+            '0.5 told', False, False,
+        )  # fmt: skip
+        assert node._waiting() == 'waits for a heartbeat of system 7'
 
 
 @pytest.mark.parametrize('place', ['tcp:127.0.0.1:14550', 'udpin:14550', 'udpout:127.0.0.1:rov'])

@@ -81,7 +81,7 @@ class Pilot:
             return self.let_go('disarmed by the vehicle or by somebody else')
         if self.wanted and self._had_mode and mode != MANUAL:
             return self.let_go(f'mode {mode} set by somebody else')
-        self._had_mode = self._had_mode or mode == MANUAL
+        self._had_mode = mode == MANUAL
         return ''
 
     def motors(self, at_rest: bool) -> None:

@@ -109,6 +109,19 @@ def test_the_supply_is_taken_into_account(voltage: float) -> None:
     assert np.abs(delivered('bluerov2_heavy', at_16, voltage) - tau).max() > 0.7
 
 
+@pytest.mark.parametrize(
+    ('voltage', 'reverse', 'forward'),
+    [(12.0, 2.92, 3.71), (16.0, 4.1, 5.25), (18.0, 4.575, 5.975), (20.0, 5.05, 6.7)],
+)
+def test_full_thrust_each_way_follows_the_supply(voltage, reverse, forward) -> None:
+    """In kgf of a T200; four of them share a heave of 40 N, forward is down."""
+    mapping = WrenchMapping(VEHICLES['bluerov2_heavy'], ALL, voltage)
+    heave = np.eye(6)[2] * 40.0
+    down, up = (mapping.axes(tau)[0].throttle for tau in (heave, -heave))
+    assert down == pytest.approx(-np.sqrt(10.0 / (51.5 * forward / 5.25)))
+    assert up == pytest.approx(np.sqrt(10.0 / (40.2 * reverse / 4.1)))
+
+
 def test_other_thrusters_are_refused() -> None:
     with pytest.raises(InputError, match='expected a vehicle with thrusters, found none'):
         WrenchMapping(load_vehicle('rexrov'), ALL, 16.0)

@@ -24,7 +24,7 @@ def asked() -> Pilot:
     """A vehicle in MANUAL that is to be armed, with a wrench at `START`."""
     pilot = Pilot(FED, DISARM)
     pilot.want(True, START)
-    assert pilot.vehicle(False, MANUAL, START) == ''
+    assert (pilot.vehicle(False, MANUAL, START), pilot.why) == ('', '')
     pilot.command(PUSH, START)
     assert pilot.due(START, True, fresh=True) == Deed(True, axes=NEUTRAL), 'not armed yet'
     return pilot
@@ -125,8 +125,12 @@ def test_what_somebody_else_takes_is_left_with_few_neutral_inputs(armed, mode, s
     pilot.want(True, START)
     assert pilot.vehicle(True, ALT_HOLD, START) == '', 'the mode is anew to be had'
     steered = taken()
-    steered.let_go('another pilot')
-    assert (steered.commands, steered.letting_go) == (False, True)
+    for start in (START, START + 10 * AGAIN):
+        steered.let_go('another pilot')
+        assert (steered.commands, steered.letting_go) == (False, True)
+        assert len(sent(steered, start + LETTING_GO)[1]) == LEAST
+        steered.want(True, start)
+        assert steered.due(start + 9 * AGAIN, True).axes == NEUTRAL
     silent = taken()
     assert silent.due(START + DISARM + 1, True).arm is False
     assert silent.vehicle(True, ALT_HOLD, START + DISARM + 1) != ''
@@ -165,8 +169,11 @@ def test_a_vehicle_that_may_be_arming_is_disarmed(later: int, disarms: list[int]
     pilot = asked()
     pilot.want(False, START + later)
     assert sent(pilot, START + later + KEEP_ALIVE, 2)[0] == disarms
+    if disarms:
+        pilot.acknowledged(START + later + KEEP_ALIVE)
+        assert sent(pilot, START + later + AGAIN, 2)[0] == disarms, 'it may be the arming that was'
     pilot.want(False, START + later)
-    assert not sent(pilot, START + later + AGAIN, 2)[0], 'of which it is not the one any more'
+    assert not sent(pilot, START + later + 2 * AGAIN, 2)[0], 'not its own any more'
 
 
 @pytest.mark.parametrize(('later', 'counts'), [(ON_ITS_WAY - 1, False), (ON_ITS_WAY, True)])
@@ -207,3 +214,9 @@ def test_of_a_vehicle_that_was_not_heard_a_disarming_is_its_failsafe(lost: bool)
         pilot.silence()
     said = pilot.vehicle(False, MANUAL, START + DISARM + 2)
     assert (said != '', pilot.wanted) == (lost, not lost)
+    again = taken()
+    if lost:
+        again.silence()
+    assert again.vehicle(True, MANUAL, START) == ''
+    assert again.due(START + DISARM + 1, True).arm is False
+    assert again.vehicle(False, MANUAL, START + DISARM + 2) == '', 'it was heard before'

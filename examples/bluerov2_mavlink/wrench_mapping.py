@@ -113,7 +113,7 @@ class WrenchMapping:
             commands[group.thrusters] = p
             axes[list(group.dofs)] = group.axes @ p
             wanted -= self._T[:, group.thrusters] @ thrust_of(p, *here)  # e.g. pitch by surge
-        largest = max(np.abs(commands).max(), np.abs(axes).max())
+        largest = np.abs(commands).max()  # no axis is larger: each is a mean of them, but for signs
         scale = min(1.0, reach / largest) if largest else 1.0
         return PilotAxes(*(SIGNS * axes * scale).tolist()), scale**2
 
@@ -123,7 +123,7 @@ def _group(T: np.ndarray, thrusters: np.ndarray, dofs: tuple[int, ...], vehicle:
     factors = np.sign(own).T  # ArduSub's, as the geometry has them
     idle, odd = _null(own), _null(factors.T)
     inverse = np.linalg.pinv(own)
-    if len(dofs) == 1 and np.allclose(inverse, inverse[0]):  # each thruster the same
+    if np.allclose(inverse, inverse[0]):  # each thruster the same, of one degree of freedom
         return Group(thrusters, dofs, inverse, np.linalg.pinv(factors), None, None)
     strange = len(thrusters) - len(dofs) > 1
     if idle is not None and odd is not None:
@@ -147,7 +147,7 @@ def _commands(group: Group, thrust: np.ndarray, limits: tuple) -> np.ndarray:
     if group.idle is None or group.odd is None:
         return command_of(thrust, *limits)
     # odd . p rises with the share of idle thrust: there is one zero, and it lies in between
-    low, high = -(span := 2.0 * np.abs(thrust).max() / np.abs(group.idle).min()), span
+    low, high = -(span := np.abs(thrust).max() / np.abs(group.idle).min()), span
     each = [
         *zip(*(array.tolist() for array in (thrust, group.idle, group.odd, *limits)), strict=True)
     ]

@@ -7,7 +7,15 @@ from helpers.mavlink_pair import Booted, Pair
 from helpers.strategies import QUICK, vectors
 from hypothesis import given
 from numpy.testing import assert_allclose
-from wrench_mapping import FOUR, SIGNS, PilotAxes, WrenchMapping, rc_override
+from wrench_mapping import (
+    FOUR,
+    SIGNS,
+    PilotAxes,
+    WrenchMapping,
+    manual_control,
+    pulses_of,
+    rc_override,
+)
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
@@ -86,10 +94,42 @@ def test_a_pilot_gain_takes_thrust_by_its_square() -> None:
     assert half == pytest.approx(full / 4)
 
 
+@pytest.mark.parametrize('turned', [[0], [2], [0, 3], [5], [4, 5, 6, 7], [*range(8)]])
+def test_which_way_the_nose_of_a_thruster_points_does_not_matter(turned: list[int]) -> None:
+    data = read_yaml(shipped('vehicles', 'bluerov2_heavy'), 'vehicle')
+    for i in turned:
+        one = data['thrusters'][i]
+        back = {'direction': [-x for x in one['direction']], 'limit': one['limit'][::-1]}
+        data['thrusters'][i] = {key: one[key] for key in ('name', 'position')} | back
+    mapping = WrenchMapping(vehicle_from_dict(data, 'mine'), ALL, 16.0)
+    usual = MAPPINGS['bluerov2_heavy']
+    for tau in ([20.0, -15.0, 25.0, 1.0, -2.0, 3.0], [-5.0, 8.0, -4.0, -1.0, 0.5, -2.0]):
+        axes, share = mapping.axes(np.array(tau))
+        wanted, whole = usual.axes(np.array(tau))
+        assert (axes, share) == (pytest.approx(wanted, abs=1e-6), whole)
+
+
+def test_what_is_sent_keeps_each_axis_in_its_place_and_within_its_range() -> None:
+    axes = PilotAxes(0.1, 0.2, 0.3, 0.35, 0.4, -0.45)
+    assert axes.pulses() == (1660, 1640, 1620, 1320, 1540, 1580)
+    message = rc_override(axes, 3, 7)
+    assert (message.target_system, message.target_component) == (3, 7)
+    others = [getattr(message, f'chan{i}_raw') for i in range(7, 19)]
+    assert others == [65535] * 12, 'left as they are'
+    message = manual_control(axes, 3, 0.5)
+    found = message.target, message.x, message.y, message.z, message.r, message.buttons
+    assert found == (3, 200, 400, 800, -900, 0)
+    assert pulses_of(message, 0.5, 1.0) == (1500, 1500, 1620, 1320, 1540, 1580)
+    beyond = manual_control(PilotAxes(1.0, -1.0, -1.0, yaw=1.0), 3, 0.5)  # a gain that has fallen
+    assert (beyond.x, beyond.y, beyond.z, beyond.r) == (1000, -1000, 0, 1000)
+    assert pulses_of(beyond, 0.5, 3.0) == (1500, 1500, 1100, 1700, 1700, 1300)
+
+
 def test_what_cannot_be_commanded_is_left_out() -> None:
     four = WrenchMapping(VEHICLES['bluerov2_heavy'], FOUR, 16.0)
     axes, share = four.axes(np.array([5.0, 5.0, 5.0, 50.0, 50.0, 1.0]))
     assert (axes.roll, axes.pitch, share) == (0.0, 0.0, 1.0)
+    assert four.axes(np.zeros(6)) == (PilotAxes(), 1.0)
     assert MAPPINGS['bluerov2'].dofs == (0, 1, 2, 3, 5)  # two vertical thrusters do not pitch
 
 

@@ -264,7 +264,8 @@ def test_without_recorder_it_ends_with_the_last_wrench(peer) -> None:
 
 
 def test_credit_holds_the_plant_while_the_recorder_is_behind(peer) -> None:
-    plant = peer.add(PlantNode, {**BARRIER, 'recorder_window': 2, 'duration': 0.05})
+    shallow = {'qos_overrides./clock.publisher.depth': 1}  # which no step waits for
+    plant = peer.add(PlantNode, {**BARRIER, **shallow, 'recorder_window': 2, 'duration': 0.05})
     listening(peer)
     answered(peer, 0, 2)  # ack is -1: steps 0 and 1 are free
     peer.spin(0.2)

@@ -499,6 +499,21 @@ def test_what_has_arrived_is_taken_before_a_subscription_is_made_anew() -> None:
     assert (qos.reliability, qos.durability) == (weak.reliability, DurabilityPolicy.VOLATILE)
 
 
+def test_what_cannot_be_recorded_is_said_once_and_not_tried_again() -> None:
+    said, found = [], [SimpleNamespace(topic_type='no_such_msgs/msg/X')]
+    node: Any = SimpleNamespace(
+        get_topic_names_and_types=lambda: [('/x', []), ('/odom', []), ('/auv2/x', [])],
+        get_publishers_info_by_topic=lambda topic: said.append(topic) or found,
+        get_logger=lambda: SimpleNamespace(warning=said.append),
+    )
+    others = recorder.OtherTopics(node, recorder.Wanted('/', exclude=re.compile('auv2')), print)
+    for _ in range(2):
+        others.look({'/odom'})
+    why = 'no definition of no_such_msgs/msg/X'
+    assert said == ['/x', f'/x: not recorded, {why}']
+    assert others.left == {'/x': why}
+
+
 def test_a_bag_says_how_its_topics_were_remapped(tmp_path: Path, timers) -> None:
     renamed = ['--ros-args', '-r', '__ns:=/auv1', '-r', 'wrench:=/thrust']
     with program() as made:

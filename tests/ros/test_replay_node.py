@@ -418,6 +418,10 @@ def test_what_is_not_due_is_not_played_and_others_have_a_turn_between(monkeypatc
     wait, now = 0.0, 7.02
     assert player.advance(7.0) == 0.0
     assert out == [0]
+    player.playback.pause = player.playback.change_rate = lambda *given: out.append(given)
+    player.pause()
+    player.change_rate(3.0)
+    assert out[1:] == [(7.02, 1), (7.02, 1, 3.0)], 'between two messages'
 
 
 def test_gives_up_a_subscriber_that_stays_silent(tmp_path: Path, monkeypatch) -> None:

@@ -121,12 +121,18 @@ def test_what_nodes_say_of_themselves_is_told(ears: Ears) -> None:
         for level, word in levels.items()
     ]
     said[0].values = [KeyValue(key='step', value='7'), KeyValue(key='ready', value='False')]
-    ears.publisher(topics.DIAGNOSTICS).publish(DiagnosticArray(status=said))
+    publisher = ears.publisher(topics.DIAGNOSTICS)
+    publisher.publish(DiagnosticArray(status=said))
     ears.until(lambda: ears.snapshot().nodes)
     told = [(node.name, node.level, node.text) for node in ears.snapshot().nodes]
     assert told == [(f'/n{level}', word, f'is {word}') for level, word in levels.items()]
     assert ears.snapshot().nodes[0].facts == {'step': '7', 'ready': 'False'}
     assert ears.topic(topics.DIAGNOSTICS).heard == 1
+    later = DiagnosticArray(status=said)
+    later.header.stamp = convert.stamp(7 * STEP)
+    publisher.publish(later)
+    ears.until(lambda: ears.topic(topics.DIAGNOSTICS).heard == 2)
+    assert ears.topic(topics.DIAGNOSTICS).published == 2, 'by the number of its publisher'
 
 
 @pytest.mark.parametrize('named', [True, False])

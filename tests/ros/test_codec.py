@@ -1,6 +1,7 @@
 """Patched templates against message objects: the same messages, the same refusals."""
 
 import struct
+from dataclasses import replace
 from functools import cache
 
 import pytest
@@ -217,6 +218,17 @@ def test_a_layout_that_gives_other_messages_is_not_used(monkeypatch) -> None:
 
     monkeypatch.setitem(KINDS, TwistStamped, kind._replace(make=swapped))
     assert verified_layout(TwistStamped, FRAMES) is None
+
+
+@pytest.mark.parametrize('part', ['odom', 'base'])
+def test_a_layout_that_does_not_see_another_frame_is_not_used(monkeypatch, part: str) -> None:
+    kind = KINDS[Odometry]
+
+    def shouted(ns, values, frames):
+        return kind.make(ns, values, replace(frames, **{part: getattr(frames, part).upper()}))
+
+    monkeypatch.setitem(KINDS, Odometry, kind._replace(make=shouted))
+    assert verified_layout(Odometry, FRAMES) is None
 
 
 def test_every_kind_is_read_by_the_reader_of_its_topic() -> None:

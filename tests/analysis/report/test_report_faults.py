@@ -92,6 +92,7 @@ def test_spans_and_numbers_of_a_figure(runs):
     assert [(text.get_text(), text.get_position()[0]) for text in axes.texts] == [
         ('1', 1.5), ('2', pytest.approx(1.65))
     ]  # fmt: skip
+    assert all(text.get_transform() == axes.get_xaxis_transform() for text in axes.texts)
     high = [text.get_position()[1] for text in axes.texts]
     assert high[1] < high[0], 'two at one time stand below each other'
     assert axes.get_xlim() == (0.0, 2.2)

@@ -88,6 +88,7 @@ def test_every_pointer_leads_to_the_number_that_is_shown(results: Results, tmp_p
 def test_a_share_is_shown_in_percent_with_its_verdict(results: Results) -> None:
     (first, second) = results.tables['draws'].rows
     assert (first[2].text, first[2].value, first[2].kind) == ('25.0', 25.0, 'good')
+    assert first[3].text == '3'
     assert [cell.text for cell in second] == ['b', MISSING, MISSING, '12\u202f000']
     assert [head.unit for head in results.tables['draws'].columns] == ['', 'N', '%', '']
 

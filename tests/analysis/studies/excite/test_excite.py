@@ -201,7 +201,7 @@ def test_the_command_writes_what_was_found(excited, tmp_path: Path, monkeypatch,
 
 
 def test_amplitudes_are_made_less_by_seven_halves_until_the_worst_motion_fits(monkeypatch) -> None:
-    share, size = np.linspace(0.1, 0.9, 10).reshape(2, 1, 5), np.array([0.5, 2.0, 1e9])
+    share, size = np.linspace(0.1, 0.9, 10).reshape(2, 1, 5), np.array([0.5, 2.1, 1e9])
     share[1, 0, 3] = 1.0
 
     def used(_: object, x: np.ndarray, fleet: str) -> np.ndarray:
@@ -213,7 +213,7 @@ def test_amplitudes_are_made_less_by_seven_halves_until_the_worst_motion_fits(mo
     family = SimpleNamespace(driven=[0, 4], waves=lambda x: x)
     x = np.tile([0.0, -1.0, 0.7, -0.3], (3, 1))
     found = searching.within(request, family, x, ('fleet',), 1.0)
-    least, less = np.log(0.02), np.log(0.02) * 23 / 128  # the next of 128 parts below log 0.5
+    least, less = np.log(0.02), np.log(0.02) * 25 / 128  # the next of 128 parts below -log 2.1
     expected = [[0.0, -1.0], [less, less - 1.0], [least, least]]
     np.testing.assert_allclose(found, np.c_[expected, x[:, 2:]])
 

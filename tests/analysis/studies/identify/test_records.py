@@ -18,6 +18,7 @@ from auv_analysis.studies.identify.identify import (
     HISTORY,
     Settings,
     _noise,
+    _search,
     _speeds,
     _still,
     _trusting,
@@ -214,6 +215,41 @@ def test_the_first_fit_is_over_a_few_segments_evenly_chosen(
     assert len(found[0].command) * herman.step == pytest.approx(length, abs=0.02)
 
 
+@pytest.mark.parametrize(
+    ('segment', 'observer', 'length', 'gain'),
+    [(None, 0.0, 6.0, 0.0), (None, None, 10.0, 0.3), (None, 0.2, 7.0, 0.2), (2.0, None, 2.0, 0.3)],
+)
+def test_a_search_goes_from_short_segments_to_those_that_the_instability_allows(
+    segment, observer, length, gain, monkeypatch
+):
+    """Longer ones with an observer, at most all there is; and beside them those of half."""
+    asked, delays, said = [], [], []
+
+    def problem(length, gain=0.0, most=None):
+        asked.append(most)
+        return length, gain
+
+    def best(of, u, theta, late, nearby):
+        delays.append((of, theta, late, nearby))
+        return [SimpleNamespace(unknowns=u, theta='better')]
+
+    grown = {0.0: 6.0, 0.2: 7.0, 0.3: 12.0}
+    monkeypatch.setattr(identifying, '_with_best_delay', best)
+    monkeypatch.setattr(identifying, '_best_observer', lambda *_: 0.3)
+    monkeypatch.setattr(identifying, 'segment_length', lambda of, *_: grown[of[1]])
+    u = SimpleNamespace(prior=SimpleNamespace(delay=0.25),
+                        coefficients=lambda _: SimpleNamespace(lag=0.5))  # fmt: skip
+    settings = Settings(segment=segment, observer=observer)
+    final, halves, tried = _search(problem, (u, 'start', 0.1), (1.25, 10.0), settings, said.append)
+    assert (final, halves) == ((length, gain), (length / 2, gain))
+    assert delays == [
+        ((1.25, 0.0), 'start', 0.1, 30.0), ((length, gain), 'better', 0.75, 9.0)
+    ]  # fmt: skip
+    assert asked[0] == identifying.FIRST
+    assert said == [f'output error over segments of {length:g} s']
+    assert len(tried) == 1
+
+
 @pytest.mark.parametrize(('prior', 'begun'), [(0.0, 3), (0.08, 4)])
 def test_delays_are_tried_to_either_side_as_long_as_the_cost_rises_little(prior, begun):
     """Lag and delay together stay as late as they were: only their shares are tried."""
@@ -324,6 +360,8 @@ def test_a_start_is_found_from_a_slow_velocity(herman, rate):
     assert_allclose(found.hydrostatics, vehicle.model.hydrostatics, rtol=0.05, atol=1.0)
     drag, true = (np.diag(a.D_linear) + np.diag(a.D_quadratic) * speeds for a in (found, vehicle))
     assert_allclose(drag, true, rtol=0.2)
+    quadratic, true = (np.diag(a.D_quadratic)[:3] for a in (found, vehicle))
+    assert_allclose(quadratic, true, rtol=0.2)
     assert late == pytest.approx(LAG + DELAY, abs=0.03)
 
 

@@ -121,7 +121,8 @@ def test_intervals_on_request_stand_beside_the_others(bag, tmp_path, approved, c
     asked = ('--bootstrap', 40, '--profile', 'lag')
     given = ('identify', bag, '--vehicle', 'herman2018', '--out', out)
     main([str(argument) for argument in (*given, *fewer, *asked)])
-    assert '  profile likelihood 1 of 1: lag\n' in capsys.readouterr().err
+    printed = capsys.readouterr()
+    assert '  profile likelihood 1 of 1: lag\n' in printed.err
     rows = parquet.read_table(out / 'coefficients.parquet').to_pylist()
     lag = next(row for row in rows if row['name'] == 'lag')
     assert lag['bootstrap_low'] < lag['value'] < lag['bootstrap_high']
@@ -129,7 +130,7 @@ def test_intervals_on_request_stand_beside_the_others(bag, tmp_path, approved, c
     assert parquet.read_table(out / 'profiles.parquet').num_rows >= 5
     assert (out / 'figures' / 'profiles.png').exists()
     approved.folder(out)
-    approved.add(capsys.readouterr().out.splitlines())
+    approved.add(printed.out.splitlines())
 
 
 def test_the_file_predicts_the_recording(bag, identified, tmp_path, monkeypatch, capsys):

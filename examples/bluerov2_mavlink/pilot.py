@@ -46,6 +46,7 @@ class Pilot:
         self._axes = NEUTRAL
         self._heard: int | None = None  # ns of the last command
         self._disarming = self._had_mode = self._lost = False
+        self._ended = False  # by who had asked for it: what was armed for it still is disarmed
         self._holds = False  # whether an input of this hand stands in the vehicle
         self._given = self._limit = 0  # neutral inputs of letting go
         self._asked: dict[str, int] = {}
@@ -57,7 +58,7 @@ class Pilot:
         arming = now - self._asked.get('arm', -AGAIN) < AGAIN
         self._disarming = not on and (self.armed or (self.wanted and arming))
         self._end(MOST)
-        self.wanted, self.why = on, '' if on else why
+        self.wanted, self.why, self._ended = on, '' if on else why, not on
         self._since, self._heard = now, None
 
     def acknowledged(self, now: int) -> None:
@@ -67,7 +68,7 @@ class Pilot:
         armed = self._asked.get('arm', -1) > self._asked.get('disarm', -1)
         self._acknowledged = now
         if armed != self.armed and (armed or self._disarming):
-            self.armed, self._disarming = armed, self._disarming and armed
+            self.armed, self._disarming = armed, armed and (self._disarming or self._ended)
 
     def vehicle(self, armed: bool, mode: int, now: int) -> str:
         """Take what a heartbeat says; a text when somebody else has taken the vehicle."""
@@ -92,7 +93,7 @@ class Pilot:
     def let_go(self, why: str) -> str:
         """Leave the vehicle to somebody else; nothing more is sent until asked again."""
         self._end(LEAST)
-        self.wanted = self._disarming = False
+        self.wanted = self._disarming = self._ended = False
         self.why = why
         return f'{why}: not commanded until ~/arm is called'
 

@@ -177,6 +177,22 @@ def test_a_vehicle_that_may_be_arming_is_disarmed(later: int, disarms: list[int]
     assert not sent(pilot, START + later + 2 * AGAIN, 2)[0], 'not its own any more'
 
 
+def test_what_is_armed_after_all_is_disarmed_unless_somebody_else_has_taken_it() -> None:
+    pilot, taken_over = asked(), asked()
+    pilot.want(False, START + AGAIN)
+    taken_over.let_go('another pilot')
+    for one, disarms in ((pilot, [0, 8]), (taken_over, [])):
+        assert sent(one, START + AGAIN + KEEP_ALIVE, 2)[0] == []
+        one.acknowledged(START + 2 * AGAIN)
+        assert one.armed
+        assert sent(one, START + 2 * AGAIN, 10)[0] == disarms
+    again = asked()
+    again.want(False, START + AGAIN)
+    again.want(True, START + AGAIN)
+    again.acknowledged(START + 2 * AGAIN)
+    assert again.commands
+
+
 @pytest.mark.parametrize(('later', 'counts'), [(ON_ITS_WAY - 1, False), (ON_ITS_WAY, True)])
 def test_an_acknowledgement_is_newer_than_a_heartbeat_on_its_way(later, counts) -> None:
     pilot = asked()

@@ -5,17 +5,14 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.control.gains import (
     body_gains,
     sampled_rate,
     sampling_warning,
-    sign_warning,
     state_warning,
 )
 from auv_gvc_controller.laws.cl import CL
 from auv_gvc_controller.laws.law import make_gains
-from auv_gvc_controller.laws.model import ControlModel
 
 M = np.diag([2.0, 4.0, 5.0, 1.0, 10.0, 8.0])
 
@@ -125,25 +122,3 @@ def test_the_states_of_a_law_have_a_rate_of_their_own():
     gains = make_gains('pid', {'k_P': 5.0, 'k_I': 1.0, 'k_D': 0.1, 'omega_f': turning})
     assert type(gains).own_rate(gains) == pytest.approx(fastest)
     assert f'rate * step = {fastest / 10:.3g}' in state_warning(gains, 0.1)
-
-
-@pytest.mark.parametrize('law', ['gvc', 'cl'])
-@pytest.mark.parametrize('axis', [0, 4])
-def test_a_gain_that_drives_away_from_the_set_point_is_told(law, axis):
-    def warning(**gains):
-        values = {'k_D': 3.0, 'k_I': 1.0, 'Lambda': 1.0, 'Gamma': 2.0, **gains}
-        return sign_warning(make_gains(law, values), model, M)
-
-    identity, odd = np.eye(6).ravel(), [2.0, 3.0, 4.0, 5.0, 6.0, 7.0]
-    model = ControlModel(None, identity, identity, np.diagonal(M))
-    odd[axis] = -odd[axis]
-    inertia = M[axis, axis] if law == 'cl' else 1.0  # of GVC the gain is the rate
-    for gain, name, unit in (('k_D', 'K_D', '1/s'), ('Gamma', 'K_f', '1/s²')):
-        dof, rate = DOFS[axis], odd[axis] / inertia
-        assert warning(**{gain: odd}) == (
-            f'{name} drives the velocity away from the set-point, mostly in {dof}: '
-            f'Re lambda(M^-1 {name}) = {rate:.3g} {unit}; a wrong sign?'
-        )
-    assert warning() is None
-    assert warning(k_D=0.0, Gamma=0.0) is None
-    assert sign_warning(Own(-np.eye(6).ravel()), model, M) is None

@@ -27,12 +27,7 @@ from auv_dynamics.ros.interface import NANOSECONDS, time_grid
 from auv_dynamics.vehicle.thrusters import AttainableWrench, make_reach
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
-from auv_gvc_controller.control.gains import (
-    body_gains,
-    sampling_warning,
-    sign_warning,
-    state_warning,
-)
+from auv_gvc_controller.control.gains import body_gains, sampling_warning, state_warning
 from auv_gvc_controller.control.setpoint import Setpoint, make_setpoint
 from auv_gvc_controller.laws import OPEN_LOOP
 from auv_gvc_controller.laws.law import make_gains, refusal, try_law
@@ -285,10 +280,9 @@ class Scenario(Devices):
             found.append(f'{self.path}: initial.eta: roll and pitch of {angles} rad: degrees?')
         for name in self.controllers:
             gains = self.gains(name)
-            model, M = control_model(self.vehicle), self.vehicle.M
-            loop = sampling_warning(body_gains(gains, model)[0], M, self.step)
-            own, sign = state_warning(gains, self.step), sign_warning(gains, model, M)
-            for warning in filter(None, (sign, loop, own)):
+            K_D, _ = body_gains(gains, control_model(self.vehicle))
+            loop = sampling_warning(K_D, self.vehicle.M, self.step)
+            for warning in filter(None, (loop, state_warning(gains, self.step))):
                 found.append(f'{self.path}: controllers.{name}: {warning}')
         return found
 

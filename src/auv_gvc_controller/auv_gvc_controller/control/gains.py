@@ -75,38 +75,8 @@ def sampled_rate(K_D: np.ndarray, M: np.ndarray) -> tuple[float, str]:
     """
     eigenvalues, modes = np.linalg.eig(np.linalg.solve(M, K_D))
     fastest = int(np.argmax(np.abs(eigenvalues)))
-    return float(np.abs(eigenvalues[fastest])), _mostly(modes[:, fastest], M)
-
-
-def _mostly(mode: np.ndarray, M: np.ndarray) -> str:
-    """The degree of freedom with the largest part of the energy of a mode."""
-    return DOFS[int(np.argmax(np.abs(np.conj(mode) * (M @ mode))))]
-
-
-def sign_warning(gains: Any, model: ControlModel, M: np.ndarray) -> str | None:
-    """Which gain of a shipped law drives the velocity away from the set-point; None: none does.
-
-    Nothing is said of a user's law, whose K_D may be less than the damping that it makes up for.
-
-    Parameters
-    ----------
-    gains : named tuple of a law
-    model : what the law knows of the vehicle
-    M : (6, 6) inertia with added mass
-
-    """
-    if type(gains) not in SHIPPED.values():
-        return None
-    for name, unit, K in zip(
-        ('K_D', 'K_f'), ('1/s', '1/s²'), body_gains(gains, model), strict=True
-    ):
-        rates, modes = np.linalg.eig(np.linalg.solve(M, K))
-        least = int(np.argmin(rates.real))
-        if rates[least].real < -ROUNDING * np.abs(rates).max():
-            where = f'mostly in {_mostly(modes[:, least], M)}'
-            text = f'{name} drives the velocity away from the set-point, {where}'
-            return f'{text}: Re lambda(M^-1 {name}) = {rates[least].real:.3g} {unit}; a wrong sign?'
-    return None
+    energy = np.abs(np.conj(modes[:, fastest]) * (M @ modes[:, fastest]))
+    return float(np.abs(eigenvalues[fastest])), DOFS[int(np.argmax(energy))]
 
 
 def sampling_warning(K_D: np.ndarray, M: np.ndarray, step: float) -> str | None:

@@ -211,19 +211,15 @@ def matrix_table(results: Results) -> Table:
     """What the best change of each part leaves of each coupling."""
     alternatives = results.facts['alternatives']
     parts = list(dict.fromkeys(one['part'] for one in alternatives))
-    rows: list[dict[str, Any]] = []
-    for coupling in dict.fromkeys(one['coupling'] for one in alternatives):
-        row: dict[str, Any] = {'coupling': coupling} | {f'kind {part}': '' for part in parts}
-        for part in parts:
-            left = [
-                (one['ratio'], i) for i, one in enumerate(alternatives)
-                if (one['coupling'], one['part']) == (coupling, part) and one['ratio'] is not None
-            ]  # fmt: skip
-            if left:
-                ratio, i = min(left)
-                row |= {part: ('alternatives', i, 'ratio')}
-                row |= {f'kind {part}': 'good' if ratio <= HALF else ''}
-        rows.append(row)
+    rows: dict[str, dict[str, Any]] = {
+        one['coupling']: {'coupling': one['coupling']} | {f'kind {part}': '' for part in parts}
+        for one in alternatives
+    }
+    left = [(one['ratio'], i) for i, one in enumerate(alternatives) if one['ratio'] is not None]
+    for ratio, i in sorted(left, reverse=True):  # the least one stays
+        coupling, part = alternatives[i]['coupling'], alternatives[i]['part']
+        rows[coupling][part] = 'alternatives', i, 'ratio'
+        rows[coupling][f'kind {part}'] = 'good' if ratio <= HALF else ''
     shown: dict[str, Shown] = {
         'coupling': described('', 'coupling that the change was made for'),
         **{
@@ -238,7 +234,7 @@ def matrix_table(results: Results) -> Table:
         'Which change removes which coupling: what the best change of each kind, made for that '
         'coupling alone, leaves of it. Every entry was simulated with its own vehicle.'
     )
-    return document_table(results, 'matrix', caption, rows, shown)
+    return document_table(results, 'matrix', caption, list(rows.values()), shown)
 
 
 def alternatives_table(results: Results) -> Table:

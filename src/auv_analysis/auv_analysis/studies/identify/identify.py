@@ -310,10 +310,9 @@ def _of_still(problem: OutputError, fit: Fit, every: Unknowns) -> np.ndarray:
 
 def _speeds(records: Sequence[Record]) -> np.ndarray:
     """(6,) root mean squares of the velocities, a usual size where none was measured."""
-    every = np.concatenate([record.velocity for record in records])
-    count = np.isfinite(every).sum(axis=0)
-    moved = np.sqrt(np.nansum(every**2, axis=0) / np.maximum(count, 1))
-    return np.where(count > 0, np.maximum(moved, 1e-3), UNSEEN)
+    known = np.any([record.known for record in records], axis=0)
+    moved = _rms([record.velocity for record in records])
+    return np.where(known, np.maximum(moved, 1e-3), UNSEEN)
 
 
 def _trusting(u: Unknowns, known: np.ndarray) -> Unknowns:
@@ -331,7 +330,10 @@ def _trusting(u: Unknowns, known: np.ndarray) -> Unknowns:
 
 
 def _rms(arrays: Sequence[np.ndarray]) -> np.ndarray:
-    return np.sqrt(np.mean(np.concatenate(arrays) ** 2, axis=0))
+    """Root mean square of what is known of each column, zero of none."""
+    every = np.concatenate(arrays)
+    count = np.isfinite(every).sum(axis=0)
+    return np.sqrt(np.nansum(every**2, axis=0) / np.maximum(count, 1))
 
 
 def _with_best_delay(

@@ -487,9 +487,10 @@ def test_a_controller_that_diverges_leaves_the_others_their_report(folder, capsy
     errors = said.err.splitlines()
     assert json.loads(said.out) == json.loads(Path('lauv/summary.json').read_text())
     assert errors[-1] == 'case1_lauv, cl: the closed loop diverges, not finite from t = 0.27 s'
-    (summary,) = json.loads(Path('lauv/summary.json').read_text()).values()
-    assert summary['law'] == 'gvc'
-    assert summary['notes'] == [f'{FAILED}: {errors[-1]}']
+    summaries = json.loads(Path('lauv/summary.json').read_text())
+    assert summaries.keys() == {'gvc'}
+    assert summaries['gvc']['law'] == 'gvc'
+    assert summaries['gvc']['notes'] == [f'{FAILED}: {errors[-1]}']
     assert Path('lauv/report.html').exists()
 
 
@@ -501,8 +502,11 @@ def test_of_several_that_fail_the_first_is_named(folder, monkeypatch, capsys) ->
         raise ArithmeticError(f'{name} diverges')
 
     monkeypatch.setattr(scenario_runs, 'simulate', diverge)
+    assert _exit_code('simulate', 'case1') == 1
+    assert capsys.readouterr().err.splitlines()[-1] == 'gvc diverges'
+    tried.clear()
     asked = [word for name in ('cl', 'gvc', 'cl') for word in ('--controller', name)]
-    assert _exit_code('simulate', 'case1', *asked) == 1
+    assert _exit_code('simulate', 'case1', '--out', 'asked', *asked) == 1
     assert tried == ['cl', 'gvc']
     assert capsys.readouterr().err.splitlines()[-1] == 'cl diverges'
 

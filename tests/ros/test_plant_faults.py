@@ -81,19 +81,23 @@ def test_real_time_withholds_odometry_and_ignores_wrenches() -> None:
     heard_again = 200  # step: 80 after the loss, of which the watchdog waits for 50
     last = heard_again + 270  # of which a pause makes up for 200
 
-    def held(found: tuple[list[int], list[int], np.ndarray]) -> bool:
-        applied = found[2]
+    def held(applied: np.ndarray) -> bool:
         return bool(120 >= applied[125] >= applied[119] > 0)  # of step 119 at the latest
 
-    true, stamps, applied = found = undisturbed(lambda: in_real_time(heard_again, last), held)
+    def goes_on(applied: np.ndarray) -> bool:
+        return bool(applied[-10:].min() > heard_again)
+
+    true, stamps, applied = undisturbed(
+        lambda: in_real_time(heard_again, last), lambda found: held(found[2]) and goes_on(found[2])
+    )
     assert true == list(range(last + 1))
     # lost from 30 to before 50; what was measured from 80 on was still under way at 100
     assert stamps == [*range(30), *range(50, 80), *range(100, last + 1)]
     meanwhile = set(applied[120:heard_again]) - {0.0}
     assert len(meanwhile) <= 1, 'the last one is held, then none: none that came meanwhile'
-    assert held(found), 'the last one is held'
+    assert held(applied), 'the last one is held'
     assert (applied[heard_again - 15 : heard_again] == 0).all(), 'then the watchdog has zeroed it'
-    assert applied[-10:].min() > heard_again, 'and wrenches are heard again'
+    assert goes_on(applied), 'and wrenches are heard again'
 
 
 def in_real_time(heard_again: int, last: int) -> tuple[list[int], list[int], np.ndarray]:

@@ -471,7 +471,9 @@ def test_vehicles_of_a_closed_loop_move_as_their_errors_make_them() -> None:
     assert np.abs(other - prior).max() > 1e-3
 
 
-def test_a_vehicle_that_sinks_must_close_its_loop() -> None:
+def test_a_vehicle_that_sinks_must_close_its_loop(monkeypatch) -> None:
+    for name in ('PHASES', 'STARTS'):
+        monkeypatch.setattr(searching, name, 2)
     bounds = Bounds(np.array([500.0, 500.0, 1500.0, 150.0, 600.0, 200.0]), 0.4, 0.8, 0.8,
                     np.array([np.inf, np.inf, 10.0]))  # fmt: skip
     heavy = request_of('herman2018', duration=20.0, step=0.1, bounds=bounds)

@@ -228,7 +228,7 @@ def test_nine_tenths_of_the_power_at_one_frequency_tell_little(beside, said):
 
 
 def test_gains_of_the_wrench_cannot_be_told_from_all_inertia(herman):
-    training, held = split([herman[0]], 0.25)
+    training, held = split([herman[0].part(0.0, 30.0)], 0.25)
     free = ('M', 'D_linear', 'D_quadratic', 'restoring', 'lag', 'delay', 'gain')
     result = identify(training, held, load_vehicle('herman2018'), Settings(free))
     rows = {row['name']: row for row in result.coefficients()}
@@ -266,7 +266,7 @@ def test_a_velocity_that_is_not_measured_is_found_where_the_model_shows_it(herma
 
 
 def test_what_somebody_knows_is_kept(herman):
-    training, held = split([herman[0]], 0.25)
+    training, held = split([herman[0].part(0.0, 20.0)], 0.25)
     believed = {'M.surge.surge': (280.0, 1e-3)}
     result = identify(training, held, load_vehicle('herman2018'), Settings(FEW, believed=believed))
     rows = {row['name']: row for row in result.coefficients()}

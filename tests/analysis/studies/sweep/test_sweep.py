@@ -97,7 +97,7 @@ def test_rows_do_not_depend_on_blocks_workers_or_processes(files: Path) -> None:
     for out, block, executor, ahead in (
         ('single', 1, ThreadPoolExecutor(3), 7),
         ('whole', 16, ThreadPoolExecutor(1), 1),
-        ('processes', 3, ProcessPoolExecutor(2, get_context('spawn')), 4),
+        ('processes', 3, ProcessPoolExecutor(1, get_context('spawn')), 4),
     ):
         (files / 'campaign.yaml').write_text(text.replace('block: 5', f'block: {block}'))
         with executor:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from helpers import artists
 from helpers.approved import Approved
-from helpers.artists import bands, legend, levels, named, same, spans
+from helpers.artists import bands, legend, levels, named, near, same, spans
 from helpers.certificates import certificate_of
 from helpers.made_runs import (
     DOFS,
@@ -290,9 +290,9 @@ def test_kinetic_energies_are_those_of_their_runs(pair, three, runs, together: s
     assert len(stacked) == 6
     for i, (colour, t, low, high) in enumerate(stacked):
         assert colours.get(rf'$\xi_{i + 1}$', colour) == colour
-        assert t == pytest.approx(two.t)
-        assert low == pytest.approx(parts[:, :i].sum(axis=1), abs=1e-9)
-        assert high == pytest.approx(parts[:, : i + 1].sum(axis=1))
+        near(t, two.t)
+        near(low, parts[:, :i].sum(axis=1), 0.0, 1e-9)
+        near(high, parts[:, : i + 1].sum(axis=1))
 
 
 def test_shares_of_the_mean_energy_are_those_of_their_runs(three, runs) -> None:
@@ -485,9 +485,9 @@ def test_estimates_of_foreign_runs_with_their_standard_errors(
         (curve,) = shown
         same(curve, run.t, values[:, i])
         ((_, t, low, high),) = bands(axes)
-        assert t == pytest.approx(run.t)
-        assert low == pytest.approx((values - 2 * error)[:, i])
-        assert high == pytest.approx((values + 2 * error)[:, i])
+        near(t, run.t)
+        near(low, (values - 2 * error)[:, i])
+        near(high, (values + 2 * error)[:, i])
         assert axes.get_xlabel() == ('$t$ (s)' if i % 3 == 2 else '')
         assert axes.get_xlim() == (START, START + 12.0)
     assert (f'inputs_{name}' in figures) == (name == 'told')
@@ -663,8 +663,8 @@ def test_interactive_panels_show_the_signals_of_their_runs(page, runs, signal, h
     for (name, i), (glyph, t, data) in zip(wanted, shown.values(), strict=True):
         run, y = runs[name], data[_read(glyph.y)]
         there = ~np.isnan(y)
-        assert t[there] == pytest.approx(run.t, rel=1e-6)
-        assert y[there] == pytest.approx(values(run)[:, i], rel=1e-5, abs=1e-4)
+        near(t[there], run.t)
+        near(y[there], values(run)[:, i], 1e-5, 1e-4)
         assert np.count_nonzero(~there) == len(run.gaps)
         assert _read(glyph.line_color) == plots.COLOURS[i]
         assert _read(glyph.line_dash) == {'one': [], 'two': [7, 3], 'three': [2, 2]}[name]

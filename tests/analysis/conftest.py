@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from helpers import approved as approving
+from helpers import artists
 from helpers.artists import captured
 from helpers.browser import Watched, chromium
 
@@ -73,6 +74,13 @@ def report(browser, report_path) -> Iterator[Watched]:
 def unrendered() -> Iterator[None]:
     """Figures are composed but not rendered, which takes most of the time of a report."""
     with captured():
+        yield
+
+
+@pytest.fixture
+def undrawn() -> Iterator[None]:
+    """Not even composed, where nothing that they show is looked at."""
+    with artists.undrawn():
         yield
 
 

@@ -52,6 +52,21 @@ def captured(*, panels: bool = False) -> Iterator[dict[str, Figure]]:
         yield found
 
 
+@contextmanager
+def undrawn() -> Iterator[None]:
+    """Figures are not composed either: blank files stand for all, for tests that look elsewhere."""
+
+    def saved(folder: Path, name: str, _: Any) -> plots.FigureRecord:
+        files = [folder / f'{name}.{kind}' for kind in ('png', 'pdf')]
+        Image.new('1', (720, 300), 'white').save(files[0])
+        files[1].touch()
+        return plots.FigureRecord(name, 'Not drawn', 'Not drawn.', *files)
+
+    with captured(), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plots, '_saved', saved)
+        yield
+
+
 def lines(axes: Axes) -> list[Line2D]:
     """Lines that show data: no borders, no keys without points."""
     return [

@@ -17,7 +17,7 @@ import psutil
 import pytest
 import yaml
 from geometry_msgs.msg import WrenchStamped
-from helpers.artists import captured
+from helpers.artists import captured, undrawn
 from helpers.patience import patience
 from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
@@ -480,7 +480,7 @@ def test_analyze_refuses_a_topic_of_another_type(folder, capsys) -> None:
 
 
 def test_a_controller_that_diverges_leaves_the_others_their_report(folder, capsys) -> None:
-    with captured():
+    with undrawn():
         line = 'simulate', 'case1_lauv', '--hold', 'zoh', '--out', 'lauv', '--json'
         assert _exit_code(*line) == 1
     said = capsys.readouterr()

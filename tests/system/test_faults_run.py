@@ -9,7 +9,7 @@ import numpy as np
 import psutil
 import pyarrow.parquet as parquet
 import pytest
-from helpers.artists import captured
+from helpers.artists import undrawn
 from helpers.graph_runs import assert_same, both
 from helpers.node_processes import fresh_domain
 from helpers.report_pages import Page
@@ -49,7 +49,7 @@ faults:
 def done(tmp_path_factory) -> Path:
     root = tmp_path_factory.mktemp('failing')
     (root / 'failing.yaml').write_text(SCENARIO)
-    with captured(), pytest.MonkeyPatch.context() as patch:
+    with undrawn(), pytest.MonkeyPatch.context() as patch:
         executes = Mock(begin=psutil.Popen)  # not forked from this process, which has threads
         patch.setattr(recorded_runs, 'ForkServer', lambda _: nullcontext(executes))
         patch.setattr(recorded_runs, 'ANNOUNCED', 0.0)  # s: nobody else is on a domain of its own

@@ -353,7 +353,7 @@ def hostile(folder: Path, *, scenario: str = 'case1', bag: str = 'gvc') -> Path:
 
 
 @pytest.mark.parametrize('name', ['..', '/'])
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_nothing_is_written_outside_of_the_folder_of_the_results(tmp_path: Path, name: str) -> None:
     bag = hostile(tmp_path / 'deep' / 'bag', bag=name)
     before = {p: p.stat().st_mtime_ns for p in tmp_path.rglob('*')}

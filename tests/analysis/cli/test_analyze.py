@@ -21,7 +21,7 @@ from auv_analysis.studies.sweep import report
 from auv_dynamics.files.errors import InputError
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_every_bag_is_read_once_and_shows_its_own_files(tmp_path, monkeypatch) -> None:
     bags = [make_bag(tmp_path / name, 300, name) for name in ('case1', 'case2', 'case1_rexrov')]
     read: list[str] = []
@@ -39,7 +39,7 @@ def test_every_bag_is_read_once_and_shows_its_own_files(tmp_path, monkeypatch) -
     assert page.count('<summary>Vehicle file of ') == 2, 'case1 and case2 share theirs'
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_equal_files_are_shown_once(tmp_path) -> None:
     bag = make_bag(tmp_path / 'case1', 300)
     main.main(['analyze', str(bag), str(bag), '--out', str(tmp_path / 'out')])

@@ -59,7 +59,7 @@ def test_without_thrusters_only_the_weight_is_known() -> None:
     assert 'in heave, is 3.0 times the weight' in text
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_a_study_of_a_vehicle_says_what_no_thruster_actuates(tmp_path, capsys) -> None:
     data = yaml.safe_load(shipped('scenarios', 'case1_bluerov2').read_text())
     (tmp_path / 'short.yaml').write_text(yaml.safe_dump(data | {'duration': 2.5}))

@@ -432,6 +432,7 @@ def test_a_law_is_asked_with_the_vehicle_that_is_given(tmp_path, monkeypatch) ->
     assert asked == ['rexrov']
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_of_several_vehicles_one_is_named(tmp_path: Path, capsys) -> None:
     bag = tmp_path / 'bag'
     bag.mkdir()

@@ -67,7 +67,7 @@ def test_a_bag_imports_no_module(tmp_path, trace, request) -> None:
     assert not trace.exists()
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_analyze_imports_what_the_user_names_alone(tmp_path, trace, request, capsys) -> None:
     law = f'{module(request)}:Theirs'
     bag = str(write(tmp_path / 'bag.mcap', law=law))
@@ -92,7 +92,7 @@ def test_results_of_simulate_import_no_module(tmp_path, trace, request) -> None:
     assert not trace.exists()
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_another_law_on_a_replay_imports_that_one_alone(tmp_path, trace, request, capsys) -> None:
     law = f'{module(request)}:Theirs'
     bag = str(write(tmp_path / 'bag.mcap', law=law))

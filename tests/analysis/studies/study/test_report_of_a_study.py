@@ -133,7 +133,7 @@ def test_wrong_options_end_in_one_line(tmp_path, capsys, options, line):
     assert not (tmp_path / 'out').exists()
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_a_study_of_another_vehicle_has_no_claims(tmp_path):
     out = tmp_path / 'out'
     main.main(['study', 'case1_bluerov2_heavy', '--sensitivity', 'none', '--out', str(out)])
@@ -143,7 +143,7 @@ def test_a_study_of_another_vehicle_has_no_claims(tmp_path):
     assert 'discussion' in page.ids
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_all_of_a_study_is_held_and_varied_as_it_is_asked_to(tmp_path):
     path, out = tmp_path / 'case1.yaml', tmp_path / 'out'
     text = shipped('scenarios', 'case1').read_text(encoding='utf-8')

@@ -150,7 +150,7 @@ def test_every_number_of_the_report_is_in_a_file(tmp_path: Path, campaign, known
     approved.folder(out)
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_an_unfinished_sweep_says_so(tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     out = make_sweep(tmp_path, SIMPLE, simple, range(0, 16, 3))
@@ -172,7 +172,7 @@ def test_a_sweep_without_figures_is_a_failure(tmp_path: Path, capsys) -> None:
     assert not (tmp_path / 'report').exists()
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_results_are_replaced_only_when_asked_and_the_rest_stays(tmp_path: Path, capsys) -> None:
     sweep, out = make_sweep(tmp_path, MIXED, mixed), tmp_path / 'report'
     command = ['analyze', str(sweep), '--out', str(out)]

@@ -35,6 +35,10 @@ def test_at_equal_steps_it_is_scipys(count: int) -> None:
     assert_allclose(found.gain[count:-count], gain, rtol=1e-9)
     more = savgol_filter(values, count, ORDER + 2, deriv=1, delta=step, axis=0, mode='interp')
     assert_allclose(found.change, more - expected, atol=1e-7)
+    brief = rates(t, values, t, count, bias=False)
+    for name in ('rate', 'gain', 'inner_gain'):
+        assert_allclose(getattr(brief, name), getattr(found, name), rtol=1e-9, atol=1e-9)
+    assert np.isnan([*brief.change.ravel(), *brief.change_gain]).all()
 
 
 @st.composite

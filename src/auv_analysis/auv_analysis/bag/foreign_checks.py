@@ -300,7 +300,7 @@ def _acts_behind(
 def _rates(t: np.ndarray, seconds: float, *signals: np.ndarray) -> list[np.ndarray]:
     """Rates of signals (n, k) by one filter, in s, whose weights are found once."""
     count = max(2 * round(seconds / float(np.median(np.diff(t))) / 2) + 1, SMALLEST)
-    found = rates(t, np.concatenate(signals, axis=1), t, count).rate
+    found = rates(t, np.concatenate(signals, axis=1), t, count, bias=False).rate
     return np.split(found, np.cumsum([one.shape[1] for one in signals])[:-1], axis=1)
 
 

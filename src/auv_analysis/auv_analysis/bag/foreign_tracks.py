@@ -260,7 +260,7 @@ def with_rates(twist: Track, pose: Track, notes: list[str]) -> Track:
         ns = pose.ns[inside]
         if len(ns) >= SMALLEST:
             t, at = (in_seconds(times, ns[0]) for times in (ns, twist.ns[asked]))
-            angular[asked] = rates(t, turned(pose.rows[inside, 3:]), at, SMALLEST).rate
+            angular[asked] = rates(t, turned(pose.rows[inside, 3:]), at, SMALLEST, bias=False).rate
     known = ~np.isnan(angular[:, 0])
     notes.append(
         f'{pose.topic}: the angular velocity is the rate of its attitude, as told, by cubics over '

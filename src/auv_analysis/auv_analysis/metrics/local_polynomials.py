@@ -106,7 +106,9 @@ def _powers(x: np.ndarray, order: int) -> np.ndarray:
     return result
 
 
-def rates(times: np.ndarray, values: np.ndarray, at: np.ndarray, count: int) -> Rates:
+def rates(
+    times: np.ndarray, values: np.ndarray, at: np.ndarray, count: int, *, bias: bool = True
+) -> Rates:
     """Rates of local polynomials of order 3, and what order 5 would change.
 
     Parameters
@@ -114,19 +116,21 @@ def rates(times: np.ndarray, values: np.ndarray, at: np.ndarray, count: int) -> 
     times, values : (n,) rising s and (n, k), n at least `SMALLEST`
     at : (m,) s
     count : samples of a window; all samples where there are fewer
+    bias : whether that change is asked for, which takes half of the time; else it is NaN
 
     """
     count = min(count, len(times))
-    found, change = np.empty((2, len(at), values.shape[1]))
-    gain, change_gain, inner_gain = np.empty((3, len(at)))
+    orders = (ORDER, ORDER + 2) if bias else (ORDER,)
+    found, change = np.full((2, len(at), values.shape[1]), np.nan)
+    gain, change_gain, inner_gain = np.full((3, len(at)), np.nan)
     for here, near in windows(times, at, count):
         window = values[near]
-        w, finer = weights(times, at[here], near, ORDER, ORDER + 2, rate=True)
-        more = finer - w
+        w, *finer = weights(times, at[here], near, *orders, rate=True)
+        more = [(change, change_gain, one - w) for one in finer]
         # the weights of a rate sum up to zero, so that it is one of differences: by their sums
         apart = np.diff(times[near], axis=1)
         inner_gain[here] = ((np.cumsum(w[:, :-1], axis=1) * apart) ** 2).sum(axis=1)
-        for result, squares, by in ((found, gain, w), (change, change_gain, more)):
+        for result, squares, by in ((found, gain, w), *more):
             result[here] = np.einsum('mc,mck->mk', by, window)
             squares[here] = np.einsum('mc,mc->m', by, by)
     return Rates(found, gain, change, change_gain, inner_gain)
@@ -227,7 +231,7 @@ def filtered(
             rate, known, change = _parts(one, one.at, columns, count, noise)
             wide = max(round(count * float(np.median(np.diff(one.t))) / step), 1)
             bias = np.maximum(uniform_filter1d(change, wide, axis=0, mode='nearest'), 0.0)
-            doubt = rates(one.t, one.doubt[:, columns], one.at, count).rate
+            doubt = rates(one.t, one.doubt[:, columns], one.at, count, bias=False).rate
             found[:, columns], error[:, columns] = rate, np.sqrt(known + bias + doubt**2)
         values.append(found)
         errors.append(error)

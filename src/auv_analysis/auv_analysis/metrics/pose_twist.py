@@ -184,7 +184,7 @@ def compare_rates(t: np.ndarray, path: np.ndarray, velocity: np.ndarray) -> Rate
     probes = t[:: -(-len(t) // PROBES)]
     whole = cumulative_trapezoid(velocity, t, axis=0, initial=0.0)
     k = path.shape[1]
-    found = rates(t, np.concatenate([path, whole], axis=1), probes, count)
+    found = rates(t, np.concatenate([path, whole], axis=1), probes, count, bias=False)
     squares, freedom = residuals(t, np.concatenate([path, velocity], axis=1))
     noise = squares / max(freedom, 1.0)
     return RatePair(

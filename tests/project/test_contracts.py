@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from helpers.sources import imports
 
 from auv_analysis import load_scenario
 from auv_analysis.cli.main import main
@@ -28,14 +29,11 @@ ORDER = ('auv_dynamics', 'auv_gvc_controller', 'auv_analysis')
 @cache
 def imported(path: Path) -> set[str]:
     """Modules that a file imports at its top level or inside functions."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            found.add(node.module)
-            found |= {f'{node.module}.{alias.name}' for alias in node.names}
-    return found
+    return {
+        name
+        for module, taken in imports(path)
+        for name in (module, *(f'{module}.{each}' for each in taken))
+    }
 
 
 SLOW = {'numba', 'jsonschema', 'scipy', 'matplotlib', 'bokeh', 'pyarrow', 'jinja2', 'rich', 'PIL'}

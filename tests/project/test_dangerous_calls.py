@@ -30,6 +30,7 @@ CALLS = {
 }
 NAMES = {'yaml.Loader', 'yaml.FullLoader', 'yaml.UnsafeLoader', 'yaml.CLoader'}
 METHODS = {'extractall', 'unsafe_load'}  # of archives: a member may lie outside the folder
+EXPRESSIONS = (ast.Name, ast.Attribute)
 KEYWORDS = {('shell', True), ('allow_pickle', True), ('autoescape', False)}
 LISTED = {
     ('auv_gvc_controller/laws/law.py', 'importlib.import_module'),  # a user's own law
@@ -60,8 +61,8 @@ def dotted(node: ast.AST, names: dict[str, str]) -> str:
 
 def dangers(text: str) -> Iterator[str]:
     """What a source does that it should not."""
-    tree, names = ast.parse(text), {}
-    for node in ast.walk(tree):
+    nodes, names = list(ast.walk(ast.parse(text))), {}
+    for node in nodes:
         found = []
         if isinstance(node, ast.Import):
             names |= {
@@ -75,7 +76,7 @@ def dangers(text: str) -> Iterator[str]:
             names |= full
             found = [node.module, *full.values()]
         yield from (name for name in found if {name, name.split('.')[0]} & MODULES)
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Call):
             name = dotted(node.func, names)
             if name in CALLS:
@@ -86,7 +87,7 @@ def dangers(text: str) -> Iterator[str]:
                 value = keyword.value.value if isinstance(keyword.value, ast.Constant) else None
                 if (keyword.arg, value) in KEYWORDS:
                     yield f'{keyword.arg}={value}'
-        elif isinstance(node, ast.Name | ast.Attribute) and dotted(node, names) in NAMES:
+        elif isinstance(node, EXPRESSIONS) and dotted(node, names) in NAMES:
             yield dotted(node, names)
 
 

@@ -1,6 +1,5 @@
 """What the packages say of themselves: dependencies, metadata, files."""
 
-import ast
 import configparser
 import re
 import shlex
@@ -11,6 +10,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from helpers.sources import imports
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ('auv_dynamics', 'auv_gvc_controller', 'auv_analysis')
@@ -49,14 +49,9 @@ OPTIONAL = {'numba', 'llvmlite', 'distributed', 'pandas', 'rerun', 'capytaine', 
 def imported(package: str) -> set[str]:
     """Top-level modules that a package imports, without its own and Python's."""
     folder = ROOT / 'src' / package
-    found: set[str] = set()
-    for path in [*(folder / package).rglob('*.py'), *folder.glob('launch/*.py')]:
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Import):
-                found |= {alias.name for alias in node.names}
-            elif isinstance(node, ast.ImportFrom) and node.module:
-                found.add(node.module)
-    return {name.split('.')[0] for name in found} - {package} - set(sys.stdlib_module_names)
+    paths = [*(folder / package).rglob('*.py'), *folder.glob('launch/*.py')]
+    found = {module.split('.')[0] for path in paths for module, _ in imports(path)}
+    return found - {package} - set(sys.stdlib_module_names)
 
 
 def setup_text(package: str) -> str:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -128,7 +129,13 @@ def test_sweep_is_stopped_on_dask_and_finished_with_threads(cluster, files, monk
     assert all(worker.poll() is None for worker in workers)
 
 
-def test_command_starts_dask_on_this_machine(files: Path, monkeypatch, capsys) -> None:
+@pytest.mark.parametrize('processes', [False, pytest.param(True, marks=pytest.mark.long)])
+def test_command_starts_dask_on_this_machine(processes, files: Path, monkeypatch, capsys) -> None:
+    """A worker in a process of its own takes most of ten seconds to import what it runs."""
+    import distributed
+
+    cluster = partial(distributed.LocalCluster, processes=processes)
+    monkeypatch.setattr(distributed, 'LocalCluster', cluster)
     monkeypatch.chdir(files)
     main(['sweep', 'campaign.yaml', '--executor', 'dask', '--workers', '1', '--out', 'local'])
     main(['sweep', 'campaign.yaml', '--out', 'threads'])

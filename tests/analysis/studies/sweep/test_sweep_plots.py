@@ -76,16 +76,17 @@ def test_distributions_are_those_of_the_rows(simple: Drawn) -> None:
     analysis, figures, _ = simple
     panels = [axes for axes in figures['distributions'].axes if axes.lines]
     assert len(panels) == len(analysis.measures) > 10
+    controllers = analysis.sweep.table(['controller'])['controller'].to_numpy()
     for k, (axes, measure) in enumerate(zip(panels, analysis.measures, strict=True)):
         assert axes.get_title(loc='left') == measure.label
         assert axes.get_xlabel() == measure.unit
         assert axes.get_ylabel() == ('' if k % 4 else 'share of rows')
         shown = named(axes, figures['distributions'].legends[0])
         assert list(shown) == ['gvc', 'cl']
+        table = analysis.sweep.table(list(measure.columns))
+        every = measure.of(lambda name, table=table: numbers_of(table, name))
         for name, ((x, share),) in shown.items():
-            mine = analysis.sweep.table(['controller'])['controller'].to_numpy() == name
-            table = analysis.sweep.table(list(measure.columns))
-            values = measure.of(lambda name, table=table: numbers_of(table, name))[mine]
+            values = every[controllers == name]
             late = np.where(np.isnan(values), np.inf, values)
             assert share == pytest.approx([np.mean(late <= at) for at in x], abs=1.5 / len(late))
             assert x[-1] == pytest.approx(np.nanmax(values))

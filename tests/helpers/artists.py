@@ -177,8 +177,8 @@ def same(curve: tuple[np.ndarray, np.ndarray], t: np.ndarray, y: np.ndarray) -> 
 def near(found: np.ndarray, wanted: np.ndarray, rel: float = 1e-6, least: float = 1e-12) -> None:
     """As `pytest.approx`, which takes a thousand times as long for each of many numbers."""
     assert found.shape == np.shape(wanted)
-    apart, allowed = np.abs(found - wanted), np.maximum(rel * np.abs(wanted), least)
-    assert np.all(apart <= allowed), (found[~(apart <= allowed)], apart[~(apart <= allowed)])
+    off = ~(np.abs(found - wanted) <= np.maximum(rel * np.abs(wanted), least))
+    assert not off.any(), (off.sum(), found[off][:3], np.asarray(wanted)[off][:3])
 
 
 def _colour_bar(axes: Axes) -> str:

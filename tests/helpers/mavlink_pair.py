@@ -105,7 +105,7 @@ class Pair:
     def flown(self, tau: Any = None) -> 'Pair':
         """The pair once wrenches reach the motors."""
         self.link.pilot.want(True, self.now)
-        self.run(2.0, tau=np.zeros(6) if tau is None else tau)
+        self.run(1.2, tau=np.zeros(6) if tau is None else tau)
         assert self.autopilot.armed
         return self
 

@@ -209,7 +209,7 @@ def executables() -> Iterator[Finding]:
 def distro() -> Iterator[Finding]:
     """Whether another ROS than Jazzy, or packages for another Python, are in the environment."""
     others = {}
-    if os.environ.get('ROS_DISTRO', DISTRO) != DISTRO:
+    if (os.environ.get('ROS_DISTRO') or DISTRO) != DISTRO:
         others['ROS_DISTRO'] = os.environ['ROS_DISTRO']
     ours = f'{sys.version_info[0]}.{sys.version_info[1]}'
     for name in PATHS:
@@ -296,7 +296,7 @@ def shared_memory(folder: Path = SHARED) -> Iterator[Finding]:
     )  # fmt: skip
     left = left_over(folder)
     if left:
-        size = sum(path.stat().st_size for path in left if path.exists())
+        size = sum(left.values())
         found = f'{len(left)} files of ended Fast DDS processes in {folder}, {size / MEGA:.0f} MB'
         many = len(left) > MANY_SEGMENTS or free <= LITTLE_SHARED
         patterns = ' '.join(f'{folder}/*{name}*' for name in OF_FAST_DDS)
@@ -304,13 +304,18 @@ def shared_memory(folder: Path = SHARED) -> Iterator[Finding]:
         yield Finding('shared memory', 'warning' if many else 'note', found, advice)
 
 
-def left_over(folder: Path) -> list[Path]:
-    """Files of Fast DDS, of this user, that no process uses."""
+def left_over(folder: Path) -> dict[Path, int]:
+    """Files of Fast DDS, of this user, that no process uses, and their sizes in bytes."""
     names = [(path, path.name.removeprefix('sem.')) for path in folder.iterdir()]
     ours = [path for path, name in names if name.startswith(OF_FAST_DDS)]
     used = _in_use(folder)
-    own = os.getuid()
-    return [path for path in ours if str(path) not in used and path.stat().st_uid == own]
+    found = {}
+    for path in ours:
+        with suppress(FileNotFoundError):  # its process has ended meanwhile
+            about = path.stat()
+            if str(path) not in used and about.st_uid == os.getuid():
+                found[path] = about.st_size
+    return found
 
 
 def _in_use(folder: Path) -> set[str]:

@@ -29,6 +29,7 @@ from auv_analysis.driver.evidence import (
     DriverRecord,
     Settings,
 )
+from auv_analysis.driver.odometry_log import NO_STAMP
 from auv_analysis.nodes.driver_check_node import COMMANDER, RosDriverClient, _arrived
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
@@ -227,13 +228,17 @@ def test_what_was_applied_is_heard_by_who_commands() -> None:
         assert log.applied_arrived_ns[0] <= log.clock_arrived_ns[0] <= log.ended_ns
         take = {one.topic_name: one.callback for one in client._node.data_subscriptions()}
         odom = bytes(serialize_message(convert.odometry(1, np.eye(13)[3], Frames())))
+        no_stamp = convert.odometry(1, np.eye(13)[3], Frames())
+        no_stamp.header.stamp.nanosec = interface.NANOSECONDS
+        none = bytes(serialize_message(no_stamp))
         broken = b'\0\1\0\0\7'
         for topic, data, number in (
             ('/odom', odom, 3), ('/odom', broken, 4), ('/odom', odom, 5),
-            ('/wrench_applied', broken, 9), ('/odom', odom, 6),
+            ('/wrench_applied', broken, 9), ('/odom', odom, 6), ('/odom', none, 7),
         ):  # fmt: skip
             take[topic](data, {'publication_sequence_number': number})
         assert client.log(0).lost == 0
+        assert client.log(0).stamp_ns.tolist() == [1, 1, 1, NO_STAMP]
         assert client.log(0).unreadable == {'/odom': 1, 'wrench_applied': 1}
     finally:
         client.close()

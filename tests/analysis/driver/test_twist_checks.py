@@ -1,6 +1,7 @@
 """Twist against pose: each usual mistake is told by its name, with noise as without it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace as Made
 
 import numpy as np
@@ -131,6 +132,19 @@ MISTAKES: dict[str, tuple[Callable[[np.ndarray], np.ndarray], str, str]] = {
         'the pose stands still',
     ),
 }
+
+
+@pytest.mark.parametrize('strays', [(0, [0, 1]), (498, [10**18, 2 * 10**18])])
+def test_the_motion_tells_what_it_tells_beside_stray_stamps(strays: tuple[int, list[int]]) -> None:
+    heard = odometry_log(motion(noise=1e-4))
+    stamps, (k, ns) = heard.stamp_ns.copy(), strays
+    stamps[k : k + 2] = ns if k == 0 else stamps[k - 1] + np.array(ns)
+    found = found_by(replace(heard, stamp_ns=stamps), 'stamps', 'jumps', *MOTION)
+    assert {id for id, one in found.items() if one.verdict == FAIL} == {'stamps'}
+    assert found['twist_frame'].verdict == found['axis_yaw'].verdict == PASS
+    heard.x[k, 7] = 21.0
+    fast = found_by(replace(heard, stamp_ns=stamps), 'speeds')['speeds']
+    assert fast.verdict == FAIL, 'the controller would refuse it all the same'
 
 
 @pytest.mark.parametrize('noise', NOISES)

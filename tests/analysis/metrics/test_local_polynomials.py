@@ -41,6 +41,11 @@ def test_at_equal_steps_it_is_scipys(count: int) -> None:
     assert np.isnan([*brief.change.ravel(), *brief.change_gain]).all()
 
 
+def test_samples_in_a_heap_and_one_far_away_are_no_error() -> None:
+    t = np.append(0.02 * np.arange(SMALLEST - 1), 1e9)
+    assert np.isfinite(rates(t, t[:, None], t, SMALLEST).rate).all()
+
+
 @st.composite
 def uneven(draw: st.DrawFn) -> np.ndarray:
     """Rising times whose steps differ by up to a factor of a hundred."""

@@ -142,16 +142,19 @@ class DriverRecord:
     def _poses(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
         """States (n, 13) with an attitude, their rising times and arrivals in ns.
 
-        And whether these times are those of arrival.
+        And whether these times are those of arrival. Of times with gaps, over which nothing can be
+        told, the longest piece.
         """
         log = self.log
         norm = np.linalg.norm(log.x[:, 3:7], axis=1)
         good = log.finite & (np.abs(norm - 1.0) < UNIT)
         x, stamps, arrived = log.x[good], log.stamp_ns[good], log.arrived_ns[good]
-        if (np.diff(stamps) > 0).all():
-            return x, stamps, arrived, False
-        newer = np.diff(np.maximum.accumulate(arrived), prepend=-1) > 0
-        return x[newer], arrived[newer], arrived[newer], True
+        rise = bool((np.diff(stamps) > 0).all())
+        ns = stamps if rise else arrived
+        newer = np.flatnonzero(np.diff(np.maximum.accumulate(ns), prepend=-1) > 0)
+        gaps = np.flatnonzero(np.diff(ns[newer]) > self.settings.gap * NANOSECONDS)
+        longest = max(np.split(newer, gaps + 1), key=len)
+        return x[longest], ns[longest], arrived[longest], not rise
 
     @property
     def has_motion(self) -> bool:

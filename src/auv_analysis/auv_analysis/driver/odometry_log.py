@@ -9,6 +9,7 @@ import numpy as np
 from auv_dynamics.ros.interface import NANOSECONDS
 
 NONE = np.zeros(0, np.int64)
+NO_STAMP = -1  # ns: in place of what the controller takes for none
 HUGE = 1e30  # no vehicle's, and powers and sums of it are finite
 State = tuple[float, ...]
 
@@ -26,7 +27,7 @@ class OdometryLog:
     Attributes
     ----------
     began_ns, ended_ns : the window, of this machine's clock
-    arrived_ns, stamp_ns : (n,) time of arrival by that clock, and header.stamp
+    arrived_ns, stamp_ns : (n,) time of arrival by that clock, and header.stamp, or NO_STAMP
     x : (n, 13) position in m, quaternion w, x, y, z, velocity in m/s and rad/s, as they were sent,
         but finite numbers within HUGE
     frames : (header.frame_id, child_frame_id) -> in how many messages

@@ -94,8 +94,16 @@ def weights(
         asked[:, 1:] = asked[:, :-1] * np.arange(1, max(orders) + 1) / scale
         asked[:, 0] = 0.0
     A = V.swapaxes(1, 2) @ V
-    solved = [np.linalg.solve(A[:, :n, :n], asked[:, :n, None]) for n in np.add(orders, 1)]
+    solved = [_solved(A[:, :n, :n], asked[:, :n, None]) for n in np.add(orders, 1)]
     return [(V[..., : x.shape[1]] @ x)[..., 0] for x in solved]
+
+
+def _solved(A: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Solution of A x = b, A (m, n, n) symmetric; of a singular one the least that is nearest."""
+    try:
+        return np.linalg.solve(A, b)
+    except np.linalg.LinAlgError:  # samples in a heap, and one far away
+        return np.asarray(np.linalg.pinv(A, hermitian=True) @ b)
 
 
 def _powers(x: np.ndarray, order: int) -> np.ndarray:

@@ -22,7 +22,7 @@ from rclpy.qos import (
 )
 
 from auv_analysis.driver.evidence import Endpoint, GraphSnapshot
-from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog
+from auv_analysis.driver.odometry_log import NO_STAMP, OdometryBuffer, OdometryLog
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.codec import Codec, first_stamp, message_of
 from auv_dynamics.ros.endpoints import (
@@ -94,7 +94,11 @@ class CheckNode(BulkNode):
         message = message_of(data, Odometry, self.odom)
         frames = (message.header.frame_id, message.child_frame_id)
         x, number = interface.state_of(message), info.get('publication_sequence_number')
-        self.buffer.odometry(_arrived(info), first_stamp(data), x, frames, number)
+        try:
+            stamp = first_stamp(data)
+        except interface.BadMessageError:
+            stamp = NO_STAMP
+        self.buffer.odometry(_arrived(info), stamp, x, frames, number)
 
     def _on_clock(self, data: bytes, info: dict[str, Any]) -> None:
         self.buffer.clock(_arrived(info), first_stamp(data))

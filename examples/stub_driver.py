@@ -7,6 +7,7 @@ vehicle what the wrench would do. It starts `setpoint_node` and `controller_node
 """
 
 import argparse
+import math
 import os
 import subprocess
 import time
@@ -26,6 +27,7 @@ from auv_dynamics.ros import convert
 from auv_dynamics.ros.interface import Frames
 
 PERIOD = 0.02  # s: 50 Hz, as a navigation filter may give
+TIMEOUT = 0.5  # s without a wrench: no thrust
 SURGE = 0.4  # m/s, the set-point
 NODES = {
     'setpoint_node': ('auv_gvc_controller', [f'setpoint.surge.offset:={SURGE}', 'step:=0.02']),
@@ -46,16 +48,20 @@ class StubDriver(Node):
         vehicle, start = load_vehicle('herman2018_neutral'), np.zeros(6)
         truth = make_uncertainty(vehicle, [], 'stub_driver', [])
         self.plant = Plant(truth, PERIOD, 'rk4', initial_state(start, start))
-        self.tau = (0.0,) * 6
+        self.tau, self._heard = (0.0,) * 6, 0.0
         self._odom = self.create_publisher(Odometry, 'odom', 10)
         self.create_subscription(WrenchStamped, 'wrench', self._on_wrench, 1)
         self.create_timer(PERIOD, self._tick)
 
     def _on_wrench(self, message: WrenchStamped) -> None:
         force, torque = message.wrench.force, message.wrench.torque
-        self.tau = (force.x, force.y, force.z, torque.x, torque.y, torque.z)
+        tau = (force.x, force.y, force.z, torque.x, torque.y, torque.z)
+        if all(map(math.isfinite, tau)):
+            self.tau, self._heard = tau, time.monotonic()
 
     def _tick(self) -> None:
+        if time.monotonic() - self._heard > TIMEOUT:
+            self.tau = (0.0,) * 6
         self.plant.answer(self.tau)
         self.plant.advance()
         now = self.get_clock().now().nanoseconds

@@ -25,6 +25,7 @@ from auv_dynamics.vehicle.vehicle import Vehicle
 
 POLL = 0.004  # s between two looks at the socket
 COMPONENT = 191  # MAVLink's onboard computer: two stations of one id are told apart by it
+SET = 200_000_000  # ns by which the system's clock must have been set for stamps to follow
 LAST_WORDS = 1.5  # s for letting go at the end, at most
 
 
@@ -52,7 +53,7 @@ class Driver(BulkNode):
         self._link = VehicleLink(settings, self._port.send, self.graph.complain)
         self._waits: list[str] = []
         self._stale = settings.neutral
-        # stamps follow the steady clock: a step of the system's clock does not reach them
+        # stamps follow the steady clock, and the system's where that is set
         self._epoch = self.get_clock().now().nanoseconds - time.monotonic_ns()
         self._say_odometry = self.graph.output(topics.ODOM)
         self.graph.listen(topics.WRENCH, self._on_wrench, topics.newest_command())
@@ -71,7 +72,9 @@ class Driver(BulkNode):
         disarm = self._number('disarm_timeout', 3.0, 's without a wrench: disarmed')
         silence = self._number('link_timeout', 1.0, 's without a position: neutral')
         return LinkSettings(
-            system=declare(self, 'vehicle_system', int, 1, "the vehicle's MAVLink id", at_least=1),
+            system=declare(
+                self, 'vehicle_system', int, 1, "the vehicle's MAVLink id", at_least=1, at_most=255
+            ),
             station=declare(
                 self, 'system', int, 255, "own MAVLink id; the vehicle's SYSID_MYGCS",
                 at_least=1, at_most=255,
@@ -122,8 +125,18 @@ class Driver(BulkNode):
         response.success, response.message = True, word
         return response
 
+    def _follow_clock(self) -> None:
+        """Go by the clock that was set: the controller judges the age of stamps by it."""
+        before, now = time.monotonic_ns(), self.get_clock().now().nanoseconds
+        took = time.monotonic_ns() - before
+        later = now - before - took // 2 - self._epoch
+        if abs(later) > SET + took:
+            self._epoch += later
+            self.graph.complain(f'the clock was set by {later / 1e9:.3g} s: so are the stamps')
+
     def _report(self) -> None:
         """Keep what the diagnostics say; what is waited for is said as soon as it changes."""
+        self._follow_clock()
         link = self._link
         uncertainty, profile = link.clock.uncertainty, link.profile
         self.graph.facts.update(

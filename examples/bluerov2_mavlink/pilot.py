@@ -11,6 +11,7 @@ KEEP_ALIVE = 100_000_000  # ns between two neutral inputs while the vehicle is i
 LETTING_GO = 50_000_000  # ns between two neutral inputs of letting go
 LEAST, MOST = 5, 20  # of these: always; until the motors are seen at rest
 ON_ITS_WAY = 300_000_000  # ns in which a heartbeat may be older than an acknowledgement
+ARMING = 2_000_000_000  # ns after a request to arm in which a vehicle that is armed obeys that one
 
 
 class Deed(NamedTuple):
@@ -74,10 +75,13 @@ class Pilot:
         """Take what a heartbeat says; a text when somebody else has taken the vehicle."""
         if now - self._acknowledged < ON_ITS_WAY:
             armed = self.armed
-        fell, self.armed, self.mode = self.armed and not armed, armed, mode
+        fell, rose = self.armed and not armed, armed and not self.armed
+        self.armed, self.mode = armed, mode
         lost, self._lost = self._lost, False
         own = self._disarming and not lost
         self._disarming = self._disarming and armed
+        if self._ended and rose and now - self._asked.get('arm', -ARMING) < ARMING:
+            self._disarming = True  # the request to disarm, or its answer, was lost
         if self.wanted and fell and not own:
             return self.let_go('disarmed by the vehicle or by somebody else')
         if self.wanted and self._had_mode and mode != MANUAL:

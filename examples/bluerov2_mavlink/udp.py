@@ -8,6 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 LARGEST = 65535  # bytes of a datagram
 MOST = 500  # datagrams that are taken at once
+LAST_PORT = 65535
 
 
 class UdpPort:
@@ -29,7 +30,8 @@ class UdpPort:
     def __init__(self, connection: str, system: int, component: int):
         kind, _, address = connection.partition(':')
         host, _, port = address.rpartition(':')
-        if kind not in ('udpin', 'udpout') or not host or not port.isdecimal():
+        known = kind in ('udpin', 'udpout') and host and port.isdecimal()
+        if not known or int(port) > LAST_PORT:
             raise ValueError(f'expected udpin:HOST:PORT or udpout:HOST:PORT, found {connection!r}')
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)

@@ -1,5 +1,6 @@
 """What an ArduSub vehicle is asked for when it is met: messages, version, parameters."""
 
+import math
 from collections import Counter
 from collections.abc import Callable
 from typing import Any
@@ -134,9 +135,12 @@ class Profile:
         self.kind = {0: 'dev', 64: 'alpha', 128: 'beta', 192: 'rc', 255: ''}.get(kind, '')
 
     def take_parameter(self, message: Any) -> None:
-        """Take a PARAM_VALUE."""
-        if message.param_id in PARAMETERS:
-            self.values[message.param_id] = message.param_value
+        """Take a PARAM_VALUE; ValueError: not finite."""
+        name, value = message.param_id, message.param_value
+        if name in PARAMETERS:
+            if not math.isfinite(value):
+                raise ValueError(f'PARAM_VALUE: expected a finite {name}, found {value}')
+            self.values[name] = value
 
     @property
     def complete(self) -> bool:

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from vehicle_checks import SECOND, Profile, Telemetry
 from wrench_mapping import (
     MANUAL_CONTROL,
+    NEUTRAL,
     NEUTRAL_PWM,
     OVERRIDE,
     PilotAxes,
@@ -146,9 +147,12 @@ class VehicleLink:
         return sample
 
     def command(self, axes: PilotAxes, now: int) -> None:
-        """Command the axes of a wrench that has just come, once the pilot gain is known."""
+        """Command the axes of a wrench that has just come, once the pilot gain is known.
+
+        Neutral ones while the vehicle is not heard: not every controller needs odometry.
+        """
         if self.gain is not None:
-            self.pilot.command(axes, now)
+            self.pilot.command(axes if self.hears() else NEUTRAL, now)
             self._steer(now, fresh=True)
 
     def tick(self, now: int) -> None:
@@ -276,6 +280,8 @@ class VehicleLink:
         else:
             message, pulses = rc_override(deed.axes, *self._target), deed.axes.pulses()
         self._inputs.append((now, pulses))
+        while now - self._inputs[0][0] > SENT:
+            self._inputs.popleft()
         self._send(message)
 
     def _of_others(self, message: Any) -> None:
@@ -324,8 +330,6 @@ class VehicleLink:
         Two of them would take turns: the newest input counts. The driver is the one that yields.
         Where its own never show, the vehicle obeys somebody or something else: it is disarmed.
         """
-        while len(self._inputs) > 1 and now - self._inputs[0][0] > SENT:
-            self._inputs.popleft()
         self.inputs = found = tuple(getattr(message, f'chan{i}_raw') for i in range(1, 7))
         if not self.pilot.commands:
             self._followed, self._strange = 0, 0.0

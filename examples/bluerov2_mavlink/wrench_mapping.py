@@ -119,6 +119,10 @@ class WrenchMapping:
 
 
 def _group(T: np.ndarray, thrusters: np.ndarray, dofs: tuple[int, ...], vehicle: Vehicle) -> Group:
+    found = f'{len(thrusters)} thrusters for {len(dofs)} degrees of freedom'
+    other = InputError(vehicle.name, 'thrusters', 'the arrangement of a BlueROV2', found)
+    if not (len(thrusters) and dofs):
+        raise other
     own = T[np.ix_(list(dofs), thrusters)]
     factors = np.sign(own).T  # ArduSub's, as the geometry has them
     idle, odd = _null(own), _null(factors.T)
@@ -130,8 +134,7 @@ def _group(T: np.ndarray, thrusters: np.ndarray, dofs: tuple[int, ...], vehicle:
         odd = odd if idle @ odd > 0 else -odd
         strange = strange or bool(np.any(idle * odd < -ALIKE))
     if strange:
-        found = f'{len(thrusters)} thrusters for {len(dofs)} degrees of freedom'
-        raise InputError(vehicle.name, 'thrusters', 'the arrangement of a BlueROV2', found)
+        raise other
     return Group(thrusters, dofs, inverse, np.linalg.pinv(factors), idle, odd)
 
 

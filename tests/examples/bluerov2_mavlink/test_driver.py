@@ -11,7 +11,7 @@ from unittest.mock import Mock
 import driver as driver_module
 import numpy as np
 import pytest
-from driver import COMPONENT, Driver
+from driver import COMPONENT, SET, Driver
 from helpers.mavlink_relay import Relay, fork_program, free_port, start_program
 from helpers.node_processes import PATIENCE, Peer, fresh_domain, parameters, stop
 from helpers.nodes_in_process import program
@@ -270,6 +270,8 @@ def test_every_parameter_is_heard_and_nothing_is_armed_unasked(monkeypatch) -> N
         node = peer.add(Driver, {'connection': place, **GIVEN})
         with pytest.raises(InputError, match='connection: expected a free UDP port'):
             peer.add(Driver, {'connection': place})
+        with pytest.raises(InputError, match='vehicle_system: expected a number from 1 to 255'):
+            peer.add(Driver, {'vehicle_system': 256})
         first = {name: mock.call_args_list[0].args for name, mock in made.items()}
         assert first['VehicleLink'][0] == LinkSettings(7, 254, 6, 20.0, *TIMES)
         vehicle, *rest = first['WrenchMapping']
@@ -296,9 +298,17 @@ def test_every_parameter_is_heard_and_nothing_is_armed_unasked(monkeypatch) -> N
             '0.5 told', False, False,
         )  # fmt: skip
         assert node._waiting() == 'waits for a heartbeat of system 7'
+        epoch = node._epoch
+        for later, follows in ((SET // 2, False), (-2 * SET, True)):
+            node._epoch = epoch + later
+            node._report()
+            assert (abs(node._epoch - epoch) < SET // 4) == follows, 'the clock was set'
 
 
-@pytest.mark.parametrize('place', ['tcp:127.0.0.1:14550', 'udpin:14550', 'udpout:127.0.0.1:rov'])
+@pytest.mark.parametrize(
+    'place',
+    ['tcp:127.0.0.1:14550', 'udpin:14550', 'udpout:127.0.0.1:rov', 'udpin:127.0.0.1:65536'],
+)
 def test_what_is_no_connection_is_refused(place: str) -> None:
     with pytest.raises(ValueError, match='expected udpin:HOST:PORT or udpout:HOST:PORT'):
         UdpPort(place, 255, COMPONENT)

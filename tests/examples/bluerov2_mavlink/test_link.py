@@ -113,6 +113,9 @@ def test_a_short_loss_of_the_link_gives_no_odometry_no_old_command_and_recovers(
     pair.run(1.5, tau=PUSH)
     assert len(pair.samples) == before
     assert pulses(pair) == [1500] * 8
+    pair.link.command(pair.mapping.axes(PUSH)[0], pair.now)  # of who needs no odometry
+    pair.run(0.1)
+    assert pulses(pair) == [1500] * 8
     assert said(pair, 'vehicle not heard: neutral')
     pair.down = bytes
     pair.run(0.5, tau=PUSH)
@@ -191,6 +194,14 @@ def test_a_restart_of_the_vehicle_is_noticed_and_stamps_go_on() -> None:
     assert_allclose(pair.samples[-1].x[7:], pair.autopilot.plant.x[7:], atol=0.01)
 
 
+def test_of_what_was_sent_to_a_vehicle_that_shows_no_inputs_little_is_kept() -> None:
+    pair = Pair()
+    pair.down = lambda data: b'' if data[7] == mavlink.MAVLINK_MSG_ID_RC_CHANNELS else data
+    pair.flown(PUSH).run(1.0, tau=PUSH)
+    assert 90 < len(pair.link._inputs) <= 101, 'of two seconds, at 50 Hz'
+    assert max(pulses(pair)) > 1550
+
+
 def test_messages_of_others_are_dropped_and_counted() -> None:
     pair = Pair(MOVING)
     pair.run(1.0)
@@ -233,6 +244,7 @@ def test_broken_datagrams_are_counted_and_harm_nothing_behind_them(spoil) -> Non
         ('position', 'vx', 'LOCAL_POSITION_NED: expected finite numbers'),
         ('attitude', 'roll', 'ATTITUDE: expected finite numbers'),
         ('attitude', 'yawspeed', 'ATTITUDE: expected finite numbers'),
+        ('parameter', 'param_value', 'PARAM_VALUE: expected a finite RC_OPTIONS'),
     ],
 )
 def test_numbers_that_are_none_are_refused_and_said(kind, part, text) -> None:
@@ -242,6 +254,7 @@ def test_numbers_that_are_none_are_refused_and_said(kind, part, text) -> None:
     message = {
         'position': mavlink.MAVLink_local_position_ned_message(2000, *[0.0] * 6),
         'attitude': mavlink.MAVLink_attitude_message(2000, *[0.0] * 6),
+        'parameter': mavlink.MAVLink_param_value_message(b'RC_OPTIONS', 0.0, 9, 1, 0),
     }[kind]
     setattr(message, part, math.nan)
     pair._downs.send(message)

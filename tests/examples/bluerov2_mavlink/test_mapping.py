@@ -171,6 +171,9 @@ def test_other_thrusters_are_refused() -> None:
         data['thrusters'].append(data['thrusters'][i] | ahead)
     with pytest.raises(InputError, match='found 6 thrusters for 3 degrees of freedom'):
         WrenchMapping(vehicle_from_dict(data, 'mine'), ALL, 16.0)
+    data['thrusters'] = data['thrusters'][:4]  # none of them upright
+    with pytest.raises(InputError, match='found 0 thrusters for 0 degrees of freedom'):
+        WrenchMapping(vehicle_from_dict(data, 'mine'), ALL, 16.0)
 
 
 def test_neutral_stays_where_it_is() -> None:

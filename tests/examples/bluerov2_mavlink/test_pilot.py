@@ -3,6 +3,7 @@
 import pytest
 from pilot import (
     AGAIN,
+    ARMING,
     DISARM_AGAIN,
     KEEP_ALIVE,
     LEAST,
@@ -191,6 +192,17 @@ def test_what_is_armed_after_all_is_disarmed_unless_somebody_else_has_taken_it()
     again.want(True, START + AGAIN)
     again.acknowledged(START + 2 * AGAIN)
     assert again.commands
+
+
+@pytest.mark.parametrize(('later', 'disarms'), [(ARMING - 1, [0, 8]), (ARMING, [])])
+def test_a_vehicle_that_has_armed_although_it_was_let_go_is_disarmed_again(later, disarms) -> None:
+    pilot = asked()
+    pilot.want(False, START + 1)
+    assert sent(pilot, START + KEEP_ALIVE, 1)[0] == [0], 'it is lost'
+    pilot.vehicle(False, MANUAL, START + KEEP_ALIVE)  # said before it armed
+    assert sent(pilot, START + AGAIN, 2)[0] == []
+    pilot.vehicle(True, MANUAL, START + later)
+    assert sent(pilot, START + 2 * ARMING, 10)[0] == disarms, 'later it is somebody else'
 
 
 @pytest.mark.parametrize(('later', 'counts'), [(ON_ITS_WAY - 1, False), (ON_ITS_WAY, True)])

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 from std_srvs.srv import SetBool
-from udp import UdpPort
+from udp import CONNECTION, UdpPort
 from vehicle_link import LinkSettings, VehicleLink
 from wrench_mapping import FOUR, MANUAL_CONTROL, OVERRIDE, WrenchMapping
 
 from auv_dynamics import load_vehicle
-from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.errors import InputError, reason
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.interface import BadMessageError
 from auv_dynamics.ros.node_interface import ERROR, NodeInterface, steady_timer
@@ -35,9 +35,7 @@ class Driver(BulkNode):
     def __init__(self, **options: Any) -> None:
         super().__init__('bluerov2_driver', **options)
         self.graph = NodeInterface(self)
-        connection = declare(
-            self, 'connection', str, 'udpin:127.0.0.1:14550', 'udpin or udpout:HOST:PORT'
-        )
+        connection = declare(self, 'connection', str, 'udpin:127.0.0.1:14550', CONNECTION)
         name = declare(self, 'vehicle', str, 'bluerov2_heavy', 'vehicle file, or bare name')
         voltage = self._number('supply_voltage', 16.0, 'V at the thrusters')
         autoarm = declare(self, 'autoarm', bool, False, 'arm without being asked by ~/arm')
@@ -48,8 +46,11 @@ class Driver(BulkNode):
         self._mapping = WrenchMapping(vehicle, dofs, voltage)
         try:
             self._port = UdpPort(connection, settings.station, COMPONENT)
-        except (ValueError, OSError) as error:
-            raise InputError(self.get_name(), 'connection', 'a free UDP port', error) from None
+        except OSError as error:
+            found = reason(error)
+            raise InputError(self.get_name(), 'connection', 'a free UDP port', found) from None
+        except ValueError:
+            raise InputError(self.get_name(), 'connection', CONNECTION, connection) from None
         self._link = VehicleLink(settings, self._port.send, self.graph.complain)
         self._waits: list[str] = []
         self._stale = settings.neutral

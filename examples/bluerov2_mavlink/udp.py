@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 LARGEST = 65535  # bytes of a datagram
 MOST = 500  # datagrams that are taken at once
 LAST_PORT = 65535
+CONNECTION = 'udpin:HOST:PORT or udpout:HOST:PORT'
 
 
 class UdpPort:
@@ -32,7 +33,7 @@ class UdpPort:
         host, _, port = address.rpartition(':')
         known = kind in ('udpin', 'udpout') and host and port.isdecimal()
         if not known or int(port) > LAST_PORT:
-            raise ValueError(f'expected udpin:HOST:PORT or udpout:HOST:PORT, found {connection!r}')
+            raise ValueError(f'expected {CONNECTION}, found {connection!r}')
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._peer: tuple[str, int] | None = None

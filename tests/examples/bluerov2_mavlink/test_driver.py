@@ -268,8 +268,10 @@ def test_every_parameter_is_heard_and_nothing_is_armed_unasked(monkeypatch) -> N
     with program() as peer:
         place = f'udpin:127.0.0.1:{free_port(peer.context.get_domain_id())}'
         node = peer.add(Driver, {'connection': place, **GIVEN})
-        with pytest.raises(InputError, match='connection: expected a free UDP port'):
+        with pytest.raises(InputError, match='expected a free UDP port, found address already in'):
             peer.add(Driver, {'connection': place})
+        with pytest.raises(InputError, match=r'connection: expected udpin:.*, found tcp:sub:14550'):
+            peer.add(Driver, {'connection': 'tcp:sub:14550'})
         with pytest.raises(InputError, match='vehicle_system: expected a number from 1 to 255'):
             peer.add(Driver, {'vehicle_system': 256})
         first = {name: mock.call_args_list[0].args for name, mock in made.items()}

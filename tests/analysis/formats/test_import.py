@@ -273,6 +273,18 @@ def test_a_list_names_mass_and_water_as_papers_do(imported):
     assert imported('list.m', text, *reference)[0].weight == pytest.approx(98.3)
 
 
+def test_volume_and_buoyancy_of_a_list_tell_its_water(imported):
+    vehicle, document = imported('list.m', BLUEROV2 + 'V = 0.0114', *LIST)
+    assert vehicle.buoyancy == pytest.approx(114.8)
+    water = document['vehicle']['environment']['water_density']
+    assert water == pytest.approx(114.8 / (9.81 * 0.0114))
+    assert 'water_density' not in ' '.join(document['assumed'])
+    choice = '--water-density', '1025'  # then the volume is kept
+    assert imported('list.m', BLUEROV2 + 'V = 0.0114', *LIST, *choice)[0].buoyancy == (
+        pytest.approx(1025 * 9.81 * 0.0114)
+    )
+
+
 def test_what_the_user_says_is_taken_in_place_of_the_file(imported):
     options = '--water-density', '1025', '--gravity', '9.8', '--source', 'Doe 2020'
     vehicle, _ = imported('a.sdf', sdf(), *options)
@@ -430,6 +442,9 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
     'which point': ('a.m', BLUEROV2, [], '--inertia-reference'),
     'products': ('a.m', BLUEROV2 + 'Ixz = 0.01', ['--inertia-reference', 'co'], '--products'),
     'a name twice': ('a.m', BLUEROV2 + 'Mq = -0.08', LIST, 'Mq: expected each name once'),
+    'two buoyancies': (
+        'a.m', BLUEROV2 + 'V = 0.0114; rho = 1000', LIST, 'B: expected rho g V = 111.8'),
+    'two values by two names': ('a.m', BLUEROV2 + 'mass = 12', LIST, 'mass: expected 11.5 as by'),
     'nondimensional': ('a.m', BLUEROV2 + "Xvv' = 0.01", [], 'a prime'),
     'a letter for a digit': ('a.m', BLUEROV2.replace('Mq = -0.07', 'Mq = -6O'), LIST, 'Mq'),
     'a product': ('a.m', BLUEROV2.replace('Mq = -0.07', 'Mq = -6*10'), LIST, 'Mq'),

@@ -49,7 +49,8 @@ def read_derivatives(text: str, path: Path, choices: Choices) -> ImportedVehicle
         if "'" in name:
             raise draft.refuse(name, 'a coefficient with a dimension', 'a prime')
         if scalar in KNOWN:
-            scalars[scalar] = value
+            if scalars.setdefault(scalar, value) != value:
+                raise draft.refuse(name, f'{scalars[scalar]:g} as by another name', value)
         elif SURFACE.fullmatch(plain):
             draft.left_out.append(f'{name}: of a control surface, which is an input')
         elif not _placed(draft, matrices, name, plain, value):
@@ -150,8 +151,12 @@ def _body(draft: ImportedVehicle, given: dict[str, float]) -> None:
         gravity = given['W'] / given['m'], 'W / m'
     else:
         gravity = GRAVITY, 'assumed'
+    g = gravity[0] if choices.gravity is None else choices.gravity
+    volume = (draft.above_zero('V', given['V']), 'V') if 'V' in given else None
     rho = (given['rho'], 'rho') if 'rho' in given else None
-    if rho is None and 'B' in given and choices.water_density is None:
+    if rho is None and 'B' in given and volume is not None:
+        rho = given['B'] / (draft.above_zero('g', g) * volume[0]), 'B / (g V)'
+    elif rho is None and 'B' in given and choices.water_density is None:
         draft.assumed.append('environment.water_density: 1000 kg/m3; the volume is B / (rho g)')
         rho = FRESH, 'assumed; the volume belongs to it'
     draft.environment(rho, gravity)
@@ -162,9 +167,10 @@ def _body(draft: ImportedVehicle, given: dict[str, float]) -> None:
     draft.put('rigid_body.mass', mass, 'm' if 'm' in given else 'W / g')
     draft.put('rigid_body.center_of_gravity', r_G, 'xG, yG, zG; what is absent is 0')
     _tensor(draft, given, bool(np.any(r_G)))
-    volume = (given['V'], 'V') if 'V' in given else None
     if volume is None and 'B' in given:
         volume = given['B'] / (density * g), 'B / (rho g)'
+    elif volume is not None and choices.water_density is None and choices.volume is None:
+        _check_buoyancy(draft, given, density * g * volume[0])
     draft.buoyancy(volume, ([0.0] * 3, ''))
     if choices.center_of_buoyancy is None:
         r_B = [given.get(f'{axis}B', 0.0) for axis in 'xyz']
@@ -177,6 +183,11 @@ def _needed(draft: ImportedVehicle, given: dict[str, float], key: str) -> float:
     if key not in given:
         raise draft.refuse(key, 'a number', None)
     return given[key]
+
+
+def _check_buoyancy(draft: ImportedVehicle, given: dict[str, float], displaced: float) -> None:
+    if 'B' in given and abs(given['B'] - displaced) > APART * displaced:
+        raise draft.refuse('B', f'rho g V = {displaced:.6g} N', given['B'])
 
 
 def _check_weight(draft: ImportedVehicle, given: dict[str, float], weight: float) -> None:

@@ -448,6 +448,8 @@ def test_numbers_within_what_is_replaced_are_refused_where_there_is_no_place_for
     columns = rollouts(scenario, 'gvc', changes)
     assert columns['status'].tolist() == ['ok', *['refused'] * 3]
     same_as_alone(scenario, 'gvc', changes, 'continuous', columns, [0])
+    (reason,) = rollouts(scenario, 'gvc', {'setpoint': [1.0]})['reason']
+    assert reason == 'setpoint: expected a mapping of degrees of freedom, or file: CSV, found 1.0'
 
 
 def test_what_lies_within_the_bounds_of_the_schema():

@@ -86,14 +86,11 @@ def _error_fits(scenario: Scenario, keys: Keys) -> bool:
 
 def _setpoint_fits(spec: Mapping[str, Any], keys: Keys) -> bool:
     """A number of a degree of freedom that has a set-point, of a term that there is."""
-    entry = spec.get(str(keys[0]))
-    if entry is None:
-        return False
-    match keys[1:]:
-        case ('offset',):
-            return True
-        case ('terms', int(j), _):
-            return j < len(entry.get('terms', []))
+    match keys:
+        case (dof, 'offset'):
+            return dof in spec
+        case (dof, 'terms', int(j), _):
+            return j < len(spec.get(str(dof), {}).get('terms', []))
     return False
 
 

@@ -103,8 +103,9 @@ def test_seed_is_that_of_root_and_index(mixed: Campaign) -> None:
     assert len(np.unique(seeds)) == 384
 
 
-def test_a_seed_may_be_written_as_a_float(mixed: Campaign, tmp_path: Path) -> None:
-    again = load_campaign(written(tmp_path, SOURCE.replace('seed: 5', 'seed: 5.0')))
+def test_whole_numbers_may_be_written_as_floats(mixed: Campaign, tmp_path: Path) -> None:
+    again = load_campaign(written(tmp_path, SOURCE.replace('seed: 5', 'seed: 5.0\nblock: 1e3')))
+    assert (again.block, type(again.block)) == (1000, int)
     assert (again.data['seed'], type(again.data['seed'])) == (5, int)
     assert (again.seeds(0, 9) == mixed.seeds(0, 9)).all()
 

@@ -58,6 +58,9 @@ def test_words_are_groups_in_the_order_of_their_appearance() -> None:
     assert len(labels[2]) <= 60
     codes, labels = _categories(pa.chunked_array([[[2.0], [1.0, 3.0]], [[2.0]]]))
     assert (codes.tolist(), labels) == ([0, 1, 0], ['[2.0]', '[1.0, 3.0]'])
+    matrices = [np.diag([12.0, 12.0, k, 12.0, 12.0, 12.0]).tolist() for k in (1.0, 2.0)]
+    codes, labels = _categories(pa.chunked_array([[*matrices, [[3.0]]]]))
+    assert [label[:4] for label in labels] == ["1: '", "2: '", '[[3.'], 'which differ in the middle'
     codes, labels = _categories(pa.chunked_array([[True, False, True]]))
     assert (codes.tolist(), labels) == ([0, 1, 0], ['True', 'False'])
 

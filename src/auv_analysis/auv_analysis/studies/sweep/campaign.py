@@ -187,7 +187,7 @@ def load_campaign(campaign: str | Path) -> Campaign:
         'seed': 0,
         **data,
     }
-    data['seed'] = int(data['seed'])
+    data |= {key: int(data[key]) for key in ('seed', 'block') if key in data}  # 5.0 is 5
     for i, name in enumerate(data['controllers']):
         if name not in scenario.controllers:
             expected = one_of(name, scenario.controllers)

@@ -1,6 +1,7 @@
 """The folder of a sweep, opened to be read column by column."""
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -324,14 +325,19 @@ def _label(low: float, high: float, digits: int) -> str:
 
 
 def _categories(column: pa.ChunkedArray) -> tuple[np.ndarray, list[str]]:
-    """Codes of words, truths or lists by their first appearance, and their names."""
+    """Codes of words, truths or lists by their first appearance, and their names.
+
+    Names that were shortened to the same text have a number before it.
+    """
     if pa.types.is_list(column.type):
         words = [json.dumps(value) for value in column.to_pylist()]
         column = pa.chunked_array([pa.array(words, pa.string())])
     known = pc.unique(column)
     codes = pc.index_in(column, value_set=known).to_numpy()
-    return codes, [value if isinstance(value, str) and len(value) < LONGEST else shorten(value)
-                   for value in known.to_pylist()]  # fmt: skip
+    names = [value if isinstance(value, str) and len(value) < LONGEST else shorten(value)
+             for value in known.to_pylist()]  # fmt: skip
+    count = Counter(names)
+    return codes, [f'{i}: {name}' if count[name] > 1 else name for i, name in enumerate(names, 1)]
 
 
 PREFIXES = ('controllers.*.', 'vehicle.', 'setpoint.', 'controllers.')

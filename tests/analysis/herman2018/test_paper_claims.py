@@ -264,6 +264,16 @@ def test_a_set_point_of_a_file_is_not_the_papers():
     assert 'a set-point from a file' in paper_claims(told, {}).reason
 
 
+def test_claims_are_not_judged_where_a_loop_with_the_papers_gains_diverges(monkeypatch):
+    def diverges(case, law, hold):
+        raise DivergedError(f'{case.name}, {law}: the closed loop diverges')
+
+    monkeypatch.setattr(cases, 'simulate', diverges)
+    found = paper_claims(load_scenario('case1'), {})
+    said = 'not judged: with the paper’s gains, case1, gvc: the closed loop diverges.'
+    assert (found.claims, claims_sentences(found)[0].text[-len(said) :]) == ((), said)
+
+
 def test_a_name_has_one_value():
     quote = Quotes()
     assert quote('a', 1.0, 'm') == quote('a', 1.0, 'm') == '1.00'

@@ -13,7 +13,7 @@ from auv_analysis.report.document import Sentence
 from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scenario import Scenario, load_scenario
-from auv_analysis.simulation.simulate import simulate
+from auv_analysis.simulation.simulate import DivergedError, simulate
 from auv_analysis.studies.study.sensitivity import Sensitivity, sensitivity
 from auv_gvc_controller.laws.model import control_model
 
@@ -71,7 +71,10 @@ def paper_claims(
     evidence = {}
     for case in (scenario.name, *(name for name in paper.CASES if name != scenario.name)):
         at_hand = runs if case == scenario.name else {}
-        evidence[case] = case_evidence(case_of(scenario, case), at_hand, hold)
+        try:
+            evidence[case] = case_evidence(case_of(scenario, case), at_hand, hold)
+        except DivergedError as error:
+            return PaperClaims((), departures, f'with the paper’s gains, {error}')
     known = _responses(scenario, runs, sensitivities or {}, hold, threads)
     evidence[SENSITIVE_CASE] = replace(evidence[SENSITIVE_CASE], responses=known)
     claims = judged(evidence)

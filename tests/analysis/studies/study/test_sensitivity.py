@@ -318,6 +318,9 @@ def test_a_law_without_gains_and_one_that_fails_are_told_of(tmp_path, monkeypatc
     values = {'controllers': {'own': {'law': 'no_gains:Push', 'k_A': 0.0, 'k_B': 0.0}}}
     found = sensitivity(changed_scenario(load_scenario('case1'), values), 'own')
     assert found.refusal == 'the law has no gain that is not zero'
+    values = {'controllers': {'still': {'law': 'multisine'}}, 'excitation': {'yaw': {'offset': 1}}}
+    driven = changed_scenario(load_scenario('case1'), values)
+    assert sensitivity(driven, 'still').refusal == found.refusal
     assert [s.text for s in sensitivity_sentences([found])] == [
         'How own follows its gains is not known: the law has no gain that is not zero.'
     ]

@@ -21,6 +21,7 @@ from auv_analysis.simulation.variants import packed_variants
 from auv_analysis.studies.sweep.indices import Method, SensitivityPlan, spreads
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_gvc_controller.laws import OPEN_LOOP
 from auv_gvc_controller.laws.law import SHIPPED
 from auv_gvc_controller.laws.model import control_model
 
@@ -247,7 +248,8 @@ def gain_factors(scenario: Scenario, controller: str) -> GainFactors:
     InputError : no such controller
 
     """
-    scenario.controller(controller)
+    if scenario.controller(controller)['law'] == OPEN_LOOP:  # its numbers are those of a wrench
+        return GainFactors(scenario, controller, {}, {})
     given: dict[str, Any] = scenario.gain_values(controller)
     law = type(scenario.gains(controller))
     defaults = getattr(law, '_field_defaults', {})

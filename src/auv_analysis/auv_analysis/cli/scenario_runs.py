@@ -232,8 +232,8 @@ def _numbers(values: Sequence[float | None] | None) -> list[str]:
 
 def _short(value: float | None) -> str:
     """Number with three digits; with fewer, where it is so small that a column does not hold it."""
-    texts = (number(value, digits) for digits in (3, 2, 1))
-    return next(text for text in texts if len(text) <= WIDTH)
+    texts = [number(value, digits) for digits in (3, 2, 1)]
+    return next((text for text in texts if len(text) <= WIDTH), texts[-1])
 
 
 def _coupled(values: Sequence[float | None] | None, zeros: Sequence[str]) -> list[str]:

@@ -258,10 +258,12 @@ def test_what_is_not_the_papers_is_not_judged(values, words):
     assert found.reason in claims_sentences(found)[0].text
 
 
-def test_a_set_point_of_a_file_is_not_the_papers():
+def test_a_set_point_of_a_file_or_an_open_loop_is_not_the_papers():
     case = load_scenario('case1')
     told = replace(case, data=case.data | {'setpoint': {'file': 'way.csv'}})
     assert 'a set-point from a file' in paper_claims(told, {}).reason
+    wave = {'controllers': {'still': {'law': 'multisine'}}, 'excitation': {'yaw': {'offset': 1.0}}}
+    assert 'excitation, which' in paper_claims(changed_scenario(case, wave), {}).reason
 
 
 def test_claims_are_not_judged_where_a_loop_with_the_papers_gains_diverges(monkeypatch):

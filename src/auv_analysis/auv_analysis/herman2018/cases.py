@@ -12,7 +12,7 @@ from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.document import Sentence
 from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.changes import changed_scenario
-from auv_analysis.scenario.scenario import Scenario, load_scenario
+from auv_analysis.scenario.scenario import SAMPLED, Scenario, load_scenario
 from auv_analysis.simulation.simulate import DivergedError, simulate
 from auv_analysis.studies.study.sensitivity import Sensitivity, sensitivity
 from auv_gvc_controller.laws.model import control_model
@@ -62,7 +62,7 @@ def paper_claims(
     """
     if scenario.name not in paper.CASES:
         return PaperClaims((), reason=f'{scenario.name} is no case of the paper')
-    has = list(scenario.sampled)
+    has = [key for key in ('excitation', *SAMPLED) if key in scenario.data]
     has += sorted(scenario.kinds - {'herman2018'})
     if has or 'file' in scenario.data['setpoint']:
         words = ', '.join([key.replace('_', ' ') for key in has] or ['a set-point from a file'])

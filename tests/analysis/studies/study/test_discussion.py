@@ -85,7 +85,7 @@ def test_components_are_named_until_they_have_95_percent(largest, named):
 
 def test_what_never_moves_by_itself_is_not_the_most_deformed():
     found = {'gvc': summaries()['gvc']}
-    found['gvc']['velocity']['max'][3] = found['gvc']['effort']['max'][4] = 0.0
+    found['gvc']['velocity']['max'][3], found['gvc']['effort']['max'][4] = 1e-12, 0.0  # rounding
     text = said(found)
     assert 'component of roll' not in text
     assert 'input of pitch' not in text

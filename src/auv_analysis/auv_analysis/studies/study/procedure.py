@@ -20,7 +20,7 @@ from auv_analysis.report.document import Block, Section, Sentence
 from auv_analysis.report.plots import Drawn, FigureRecord, HeatMap, save_figures
 from auv_analysis.report.results import Shown, Table, described, make_table
 from auv_analysis.runs.run import Run
-from auv_analysis.studies.study.sensitivity import Kpi, Row, Sensitivity
+from auv_analysis.studies.study.sensitivity import ROUNDING, Kpi, Row, Sensitivity
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.model import ControlModel, control_model
 
@@ -383,7 +383,8 @@ def _deformed(kind: str, summary: Summary) -> Iterator[Sentence]:
     """Which component is deformed most, by how much of itself, and by which other."""
     what, cause, metric, units = DEFORMED[kind]
     largest, own = summary['coupling'][f'{kind}_max'], summary[metric]['max']
-    ratios = [a / b if b > 0 else 0.0 for a, b in zip(largest, own, strict=True)]
+    least = ROUNDING * max(own)  # below which nothing moves by itself
+    ratios = [a / b if b > least else 0.0 for a, b in zip(largest, own, strict=True)]
     i = int(np.argmax(ratios))
     if ratios[i] < SMALL:
         return

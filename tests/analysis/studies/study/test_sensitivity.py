@@ -290,6 +290,17 @@ def test_table_sentences_and_file_say_the_same(monkeypatch, tmp_path, approved):
     assert '−75 %' in text
 
 
+def test_gains_may_be_called_as_columns_of_the_table(monkeypatch):
+    known(monkeypatch, **LAWS)
+    found = sensitivity(short(), 'gvc', count=4)
+    called = dict(zip(found.gains, ('gain', 'value', 'rank', 'kpi'), strict=True))
+    rows = tuple(row | {'gain': called[row['gain']]} for row in found.rows)
+    own = replace(found, gains=(*called.values(),), rows=rows)
+    tables = [sensitivity_table([one], 'gvc') for one in (found, own)]
+    cells = [[[(c.value, c.source) for c in row] for row in table.rows] for table in tables]
+    assert cells[0] == cells[1]
+
+
 def test_what_is_small_throughout_its_kind_is_no_rounding():
     values = 1e-12 * np.linspace(1.0, 2.0, 9)
     found = {f'effort.max.{dof}': values for dof in DOFS}

@@ -52,6 +52,7 @@ HEADS: dict[str, Shown] = {
     'gain': described('main gain', 'the gain that does most'),
     'doubled': described('× 2', 'change of the KPI when that gain is doubled', '%', digits=2),
 }  # fmt: skip
+OF_GAIN = 'gain.'  # begins the column of a gain, which may be called as one of these
 SHOWN = (  # what is drawn of step 3
     'velocity_error.rms', 'velocity_error.max_after_2s', 'lumped_error.rms', 'effort.rms',
     'effort.max',
@@ -102,17 +103,21 @@ def sensitivity_table(found: Sequence[Sensitivity], controller: str) -> Table:
     of = next(of for of in found if of.controller == controller)
     group, meaning = WEIGHTS[of.method]
     rows = [
-        {'kpi': kpi.quantity.label, **mine[0], **{row['gain']: row[of.weight] for row in mine}}
+        {'kpi': kpi.quantity.label, **mine[0]}
+        | {f'{OF_GAIN}{row["gain"]}': row[of.weight] for row in mine}
         for kpi, mine in of.kpis.items()
     ]
 
     def pointer(i: int, column: str) -> str:
         row = rows[i]
-        gain, name = (column, of.weight) if column in of.gains else (row['gain'], column)
+        gain, name = row['gain'], column
+        if column.startswith(OF_GAIN):
+            gain, name = column.removeprefix(OF_GAIN), of.weight
         return f'{FILE}:{name}[{place[controller, row["figure"], row["dof"], gain]}]'
 
     gains: dict[str, Shown] = {
-        gain: described(symbol(gain), meaning, group=group, decimals=2) for gain in of.gains
+        f'{OF_GAIN}{gain}': described(symbol(gain), meaning, group=group, decimals=2)
+        for gain in of.gains
     }
     caption = (
         f'How the KPIs of {controller} change when every gain is multiplied by a number '

@@ -393,6 +393,7 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
     'no density': (
         'a.sdf', re.sub('<uniform.*density>', '', sdf()), [], '--water-density'),
     'xUU': ('a.sdf', sdf(more='<zWW>-3</zWW>'), [], '--quadratic-abs'),
+    'a coefficient twice': ('a.sdf', sdf(more='<xU>-3</xU>'), [], 'xU: expected each coefficient'),
     'two velocities': ('a.sdf', sdf(more='<yVabsR>-3</yVabsR>'), [], '--leave-out'),
     'u times another abs': ('a.sdf', sdf(more='<yUabsV>-3</yUabsV>'), [], '--leave-out'),
     'which lift': ('a.m', REMUS + REMUS_LIFT, LIST, '--lift alone'),

@@ -106,6 +106,8 @@ def _coefficients(draft: ImportedVehicle, plugin: Element, link: Element) -> Non
             if tag not in OTHERS and isinstance(child.tag, str):
                 draft.cannot_hold(tag, 'no parameter of the hydrodynamics plugin')
             continue
+        if plugin.find(tag) is not child:
+            raise draft.refuse(tag, 'each coefficient once', 'again')
         value = numbers(child.text, 1, draft.file, tag)[0]
         i, j = ROWS.index(match[1]), COLUMNS.index(match[3])
         if match[2]:

@@ -322,6 +322,10 @@ def test_thrusters_that_give_no_roll_leave_it_out_of_the_loop():
     for dof, one in zip(DOFS, found, strict=True):
         assert np.isfinite(one.crossover) == (dof not in lost), dof
     assert lost
+    law = LAWS['smc'] | {'Lambda': 1.5, 'Gamma': [180, 180, 270, 6, 9, 9]}
+    late = {'actuators': {'thrusters': True, 'lag': 0.05}, 'controllers': {'smc': law}}
+    loop = ControlLoop(scenario_of(vehicle='case1_bluerov2', step=0.01, **late), 'smc').loop()
+    assert margins.stable(loop), 'three integrals that drive nothing'
 
 
 def test_a_rotors_lag_counts_where_the_plant_has_it():

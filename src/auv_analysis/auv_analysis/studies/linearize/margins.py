@@ -37,9 +37,9 @@ from auv_gvc_controller.laws.model import ControlModel, control_model
 
 LEAST_GAIN, LEAST_PHASE = 10 ** (6 / 20), np.radians(45.0)  # what is to be kept
 POINTS, SLOWEST = 600, 1e-5  # of the grid: how many, and the first one relative to pi/h
-NEUTRAL = (
-    1e-7  # by which a pole may lie outside the unit circle: roll and pitch stay where they are
-)
+# by which a pole may lie outside the unit circle: roll and pitch stay where they are, and three
+# integrals of an axis that no thruster drives are a triple pole at 1, which rounding moves
+NEUTRAL = 3e-6
 CLOSED = 1e-9  # of 1 - S: below it an axis is not controlled at all
 MEASURABLE = 1e-3  # a factor of the gain below it, or above its inverse, is no margin
 FACTORS = 100.0 ** np.linspace(-1, 1, 35)  # of the present gain: tried for the largest

@@ -264,3 +264,10 @@ def test_a_figure_is_laid_out_alike_in_both_files(tmp_path: Path) -> None:
     drawn.draw_without_rendering()
     plots.save(saved, tmp_path, 'x')
     assert saved.axes[0].get_position().bounds == drawn.axes[0].get_position().bounds
+
+
+def test_a_name_in_letters_that_the_font_has_not_is_drawn_without_a_warning(tmp_path: Path) -> None:
+    figure = plots.new_figure(1.0)
+    figure.text(0.5, 0.5, '推進器')
+    record = plots.save_figures(tmp_path, {'x': lambda: (figure, 'x', '推進器')})['x']
+    assert (record.png is not None and record.png.is_file(), record.caption) == (True, '推進器')

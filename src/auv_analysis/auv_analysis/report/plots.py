@@ -3,6 +3,7 @@
 Kinds: `time_panels`, `heat_map` with numbers, `distribution`, `small_multiples`, `before_after`.
 """
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -132,7 +133,9 @@ def _few_colours(pixels: np.ndarray) -> Image.Image:
 def _saved(folder: Path, name: str, make: Callable[[], Drawn]) -> FigureRecord:
     """Draw and save a figure; where there is nothing to draw, the caption says why."""
     figure, title, caption = make()
-    files = (None, None) if figure is None else save(figure, folder, name)
+    with warnings.catch_warnings():
+        warnings.filterwarnings('ignore', 'Glyph')  # of a name: its caption has it in any script
+        files = (None, None) if figure is None else save(figure, folder, name)
     return FigureRecord(name, title, caption, *files)
 
 

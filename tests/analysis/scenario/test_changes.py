@@ -59,7 +59,7 @@ def test_changed_adds_what_is_absent() -> None:
     ('path', 'words'),
     {
         'a.b[2]': 'a.b.2.: expected an index below 2, found 2',
-        'a.b.c': 'a.b: expected a mapping that has c',
+        'a.b.c': r'a.b: expected \[0\] or another index before c',
         'a[0]': r'a: expected a list that has \[0\]',
         'e.f': 'e: expected a mapping that has f, found 1.5',
         'g[0]': 'expected a list that has',
@@ -91,6 +91,7 @@ UNREACHED = {  # path -> what its one line says
     'setpoint.sway.offset.x': 'setpoint.sway.offset.x: expected a single value, found x',
     'disturbance[1].mass': 'disturbance.1.: expected an index below 1',
     'disturbance[0].mass': 'disturbance.0..mass: expected one of kind, exponent_sign, scale',
+    'disturbance.scale': r'disturbance: expected \[0\] or another index before scale',
     'duration.s': 'duration: expected a mapping that has s, found 30.0',
     'durations': 'case1.yaml: durations: .*nearest: duration',
 }

@@ -104,7 +104,9 @@ def check_container(data: Any, parts: Parts, depth: int, file: object) -> None:
             expected = f'an index below {len(data)}'
             raise InputError(file, dotted(parts[: depth + 1]), expected, str(part))
     elif not isinstance(data, Mapping):
-        raise InputError(file, dotted(parts[:depth]), f'a mapping that has {part}', data)
+        which = f'[0] or another index before {part}'
+        expected = which if isinstance(data, list) else f'a mapping that has {part}'
+        raise InputError(file, dotted(parts[:depth]), expected, data)
 
 
 def changed_scenario(scenario: Scenario, values: Mapping[str, Any]) -> Scenario:

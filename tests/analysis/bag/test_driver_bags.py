@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.block_runs import joined
-from helpers.made_messages import FRAMES, ODOMETRY, Bag, odometry, serialized, stamped
+from helpers.made_messages import FRAMES, ODOMETRY, Bag, new, odometry, serialized, stamped
 from helpers.strategies import examples
 from hypothesis import given
 from hypothesis import strategies as st
@@ -45,11 +45,15 @@ def write(
     folder: Path, stamps: list[int], setpoints: list[int], names: Any = None, *, ahead: int = 300,
     unanswered: Any = (), **attached: str,
 ) -> Path:  # fmt: skip
-    """Bag of odometry and wrenches at `stamps` in ms, and set-points, logged `ahead` of them."""
+    """Bag of odometry and wrenches at `stamps` in ms, and set-points, logged `ahead` of them.
+
+    `recording`: what its recorder says of it, '': nothing.
+    """
     names = names or {}
     bag = Bag(folder / 'bag.mcap', chunk_size=2000)
     bag.attach('vehicle.yaml', VEHICLE)
-    bag.attach(RECORDING, attached.pop('recording', recording_text(False, {})))
+    if recording := attached.pop('recording', recording_text(False, {})):
+        bag.attach(RECORDING, recording)
     for name, text in attached.items():
         bag.attach(f'{name}.yaml', text)
     plan = [(ms, 'odom', k, ms) for k, ms in enumerate(stamps)]
@@ -130,13 +134,15 @@ def test_a_pause_of_a_driver_is_a_gap_and_one_of_lock_step_none(tmp_path: Path) 
     assert run.valid_share == pytest.approx(9 * 0.02 / 60.16)
     strict = write(tmp_path / 'strict', stamps, stamps, recording=recording_text(True, {}))
     assert load_run(strict).gaps == ()
+    assert load_run(write(tmp_path / 'unknown', stamps, stamps, recording='')).gaps == run.gaps
 
 
-def begun_anew(folder: Path, old: int, new: int, wrenches: int) -> Path:
+def begun_anew(folder: Path, old: int, new: int, wrenches: int, *, told: bool = True) -> Path:
     """Two motions of one time, of so many steps; the second one has set-points and wrenches."""
     bag = Bag(folder / 'bag.mcap', chunk_size=2000)
     bag.attach('vehicle.yaml', VEHICLE)
-    bag.attach(RECORDING, recording_text(False, {}))
+    if told:
+        bag.attach(RECORDING, recording_text(False, {}))
     for first, count in ((0, old), (100, new)):
         for k in range(count):
             ns = (1000 + 10 * k) * MS
@@ -147,11 +153,14 @@ def begun_anew(folder: Path, old: int, new: int, wrenches: int) -> Path:
     return bag.close()
 
 
-@pytest.mark.parametrize(('old', 'new', 'first'), [(200, 150, 0), (150, 200, 100)])
+@pytest.mark.parametrize(
+    ('old', 'new', 'first', 'told'),
+    [(200, 150, 0, True), (150, 200, 100, True), (150, 200, 100, False)],
+)
 def test_of_a_clock_that_begins_anew_the_longest_stretch_is_read(
-    tmp_path: Path, old: int, new: int, first: int
+    tmp_path: Path, old: int, new: int, first: int, told: bool
 ) -> None:
-    path = begun_anew(tmp_path, old, new, old)
+    path = begun_anew(tmp_path, old, new, old, told=told)
     run, mapped = load_run(path), open_bag(path, whole=1).run
     assert run.samples == 200
     for one in (run, joined([*mapped.blocks(50)])):
@@ -160,6 +169,24 @@ def test_of_a_clock_that_begins_anew_the_longest_stretch_is_read(
     assert run.notes == (
         'odom: the clock jumps back 1 times; read the longest of 2 stretches, left 150 messages',
     )
+
+
+def test_parts_that_only_stand_in_another_order_are_no_clock_that_begins_anew(tmp_path) -> None:
+    numbers = [*range(100), *range(200, 300), *range(100, 200), *range(300, 400)]
+    path = write(tmp_path, [1000 + GRID * k for k in range(400)], [])
+    bag = Bag(tmp_path / 'swapped.mcap', chunk_size=2000)
+    bag.attach('vehicle.yaml', VEHICLE)
+    bag.attach(RECORDING, recording_text(False, {}))
+    for k in numbers:
+        ns = (1000 + GRID * k) * MS
+        made = stamped('Wrench', ns, [float(k)] * 6)
+        bag.add('/odom', ODOMETRY, ns, serialized(odometry(ns, state(k))))
+        bag.add('/wrench', made.__msgtype__, ns, serialized(made))
+    plain, swapped = load_run(path), bag.close()
+    for one in (load_run(swapped), joined([*open_bag(swapped, whole=1).run.blocks(90)])):
+        assert (one.notes, one.gaps) == ((), ())
+        for name, values in plain.arrays().items():
+            assert_array_equal(one.arrays()[name], values, err_msg=name)
 
 
 @pytest.mark.parametrize('ms', [0, 10**9])
@@ -190,6 +217,21 @@ def test_a_topic_with_another_clock_is_said(tmp_path: Path) -> None:
 def test_a_controller_that_pairs_exactly_has_its_own_stamps(tmp_path: Path) -> None:
     path = write(tmp_path, [1000, 1020, 1041, 1060], [1000, 1020, 1040, 1060], params=EXACT)
     assert_array_equal(load_run(path).t, [0.0, 0.02, 0.06])
+
+
+def test_of_an_unknown_recorder_set_points_with_stamps_of_their_own_are_held(
+    tmp_path: Path,
+) -> None:
+    own = load_run(write(tmp_path / 'own', STAMPS, SETPOINTS, recording=''))
+    assert_array_equal(own.nu_d[:, 0], [1.0, 2.0, 2.0, 4.0])
+    often, seldom = list(range(1000, 1110, 10)), [1000, 1030, 1060, 1090]
+    sparse = load_run(write(tmp_path / 'sparse', often, seldom, recording=''))
+    assert_array_equal(sparse.nu_d[:, 0], [0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3])
+    same = load_run(write(tmp_path / 'same', STAMPS, STAMPS[:3], recording=''))
+    assert_array_equal(same.nu_d[:, 0], [0.0, 1.0, 2.0])
+    another = write(tmp_path / 'another', STAMPS, [10, 20, 30], ahead=0, recording='')
+    with pytest.raises(InputError, match='at least two steps'):
+        load_run(another)
 
 
 NAMES = {'odom': '/rov/nav/odometry', 'wrench': '/rov/thrust'}
@@ -311,7 +353,38 @@ def test_of_two_messages_of_a_stamp_the_first_counts(tmp_path: Path) -> None:
             moved = odometry(k * GRID * MS, state(k + other))
             bag.add('/odom', ODOMETRY, k * GRID * MS, serialized(moved))
         bag.add('/wrench', wrench.__msgtype__, k * GRID * MS, serialized(wrench))
-    assert_array_equal(load_run(bag.close()).eta[:, 0], np.arange(10.0))
+    run = load_run(bag.close())
+    assert_array_equal(run.eta[:, 0], np.arange(10.0))
+    assert run.notes == ('odom: 10 stamps came again, the first of each is kept',)
+
+
+@pytest.mark.parametrize('stranger', ['/dvl/odom', '/nav/cmd_vel'])
+def test_what_is_wrong_beside_a_complete_vehicle_does_not_matter(
+    tmp_path: Path, stranger: str
+) -> None:
+    """But to a recorder that says it is its vehicle."""
+
+    def bag(name: str, namespace: str = '') -> Path:
+        made = Bag(tmp_path / f'{name}.mcap')
+        made.attach('vehicle.yaml', VEHICLE)
+        if namespace:
+            made.attach(RECORDING, recording_text(True, {}, namespace))
+        for k in range(5):
+            ns = k * GRID * MS
+            still = odometry(ns, np.zeros(13), ('odom', 'base_link'))
+            odd = still if stranger == '/dvl/odom' else new('std_msgs/msg/String', 'x')
+            wrench = stamped('Wrench', ns, [float(k)] * 6)
+            made.add(stranger, odd.__msgtype__, ns, serialized(odd))
+            made.add('/odom', ODOMETRY, ns, serialized(odometry(ns, state(k))))
+            made.add('/wrench', wrench.__msgtype__, ns, serialized(wrench))
+        return made.close()
+
+    run = load_run(bag('untold'))
+    assert_array_equal(run.eta[:, 0], np.arange(5.0))
+    assert f'read the vehicle in / alone: {tmp_path}/untold.mcap: {stranger}: exp' in run.notes[-1]
+    for path, namespace in ((bag('told', stranger.rpartition('/')[0]), None), (bag('asked'), '/x')):
+        with pytest.raises(InputError):
+            load_run(path, namespace=namespace)
 
 
 def test_the_namespace_of_the_recorder_is_the_one_that_is_read(tmp_path: Path, capsys) -> None:

@@ -43,9 +43,12 @@ def rows(count: int, width: int) -> np.ndarray:
 
 def write(
     path: Path, *, late: int = 0, accel: bool = True, lost: tuple = (), params: dict | None = None,
-    namespace: str = '',
+    namespace: str = '', first: int = 0,
 ) -> Path:  # fmt: skip
-    """Bag of a controller's messages; set-points are logged `late` steps behind their stamps."""
+    """Bag of a controller's messages; set-points are logged `late` steps behind their stamps.
+
+    `first`: number of its first step by its stamps.
+    """
     bag = Bag(path)
     bag.attach('vehicle.yaml', shipped('vehicles', VEHICLE).read_text())
     own = {**SETTINGS, **{f'gains.{k}': [v] for k, v in GAINS.items()}}
@@ -53,7 +56,7 @@ def write(
     bag.attach('params.yaml', yaml.safe_dump({n: {'ros__parameters': v} for n, v in nodes.items()}))
     x, nu_d, slope = rows(COUNT, 13), rows(COUNT, 6), rows(COUNT, 6)
     for k in range(COUNT):
-        ns = k * STEP
+        ns = (first + k) * STEP
         if k not in lost:
             bag.add(f'{namespace}/odom', ODOMETRY, ns, serialized(odometry(ns, x[k])))
         bag.add(
@@ -63,7 +66,7 @@ def write(
             serialized(stamped('Wrench', ns, np.full(6, 1.0 * k))),
         )
     for k in range(COUNT):
-        ns = k * STEP
+        ns = (first + k) * STEP
         data = serialized(stamped('Twist', ns, nu_d[k]))
         bag.add(f'{namespace}/cmd_vel', TWIST, ns + late * STEP, data)
         if accel:
@@ -104,6 +107,11 @@ def test_files_in_another_order_are_put_in_order(tmp_path: Path) -> None:
     write(split / 'bag_0.mcap', lost=tuple(range(COUNT // 2)))
     write(split / 'bag_1.mcap', lost=tuple(range(COUNT // 2, COUNT)))
     np.testing.assert_array_equal(open_loop(recorded_loop(split), 'gvc', GAINS).tau, whole.tau)
+    write(split / 'bag_0.mcap', params=REAL_TIME, first=200)  # of a clock that begins anew
+    write(split / 'bag_1.mcap', params=REAL_TIME)
+    again = recorded_loop(split)
+    assert again.samples == COUNT
+    assert again.notes[-1].startswith('odom: the clock jumps back 1 times; read the longest of 2')
 
 
 def test_odometry_that_is_missing_is_integrated_over(tmp_path: Path) -> None:

@@ -1,7 +1,6 @@
 """Mapped topics of a bag as arrays: which numbers a message holds, stamps put in order."""
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from auv_analysis.bag.foreign_fields import (
 )
 from auv_analysis.bag.foreign_topics import HELD, MappedTopic, TopicMap, other_odometries
 from auv_analysis.bag.metadata import is_csv
-from auv_analysis.bag.reading import BACK, strays, stretches
+from auv_analysis.bag.reading import are_swapped, strays, stretches
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant
 from auv_dynamics.ros.interface import NANOSECONDS
@@ -107,14 +106,9 @@ def longest_stretch(of: Recorded, notes: list[str]) -> Recorded:
 
 
 def _is_one_clock(of: Recorded) -> bool:
-    """Whether parts that were logged right after one another only stand in another order.
-
-    Chunks and files may; where a clock began anew, the parts overlap or are apart.
-    """
-    parts = np.split(of.log, np.flatnonzero(np.abs(np.diff(of.log)) > BACK) + 1)
-    spans = sorted((part.min(), part.max()) for part in parts)
-    joined = all(0 < other[0] - one[1] <= BACK for one, other in pairwise(spans))
-    return joined and len(stretches(of.stamps[np.argsort(of.log, kind='stable')])) == 2
+    """Whether parts that were logged right after one another only stand in another order."""
+    in_time = of.stamps[np.argsort(of.log, kind='stable')]
+    return are_swapped(of.log) and len(stretches(in_time)) == 2
 
 
 def logged_with(of: Recorded, clock: Recorded) -> Recorded:

@@ -11,6 +11,7 @@ from auv_analysis.bag import attachments
 from auv_analysis.bag.reading import (
     BagContents,
     Series,
+    are_swapped,
     gathered,
     read_bag,
     slices,
@@ -18,7 +19,7 @@ from auv_analysis.bag.reading import (
     stretches,
     usual_limit,
 )
-from auv_analysis.bag.step_topics import READERS, NotOursError, namespace_of, role_of
+from auv_analysis.bag.step_topics import KINDS, READERS, NotOursError, namespace_of, role_of
 from auv_analysis.runs.run import Run, rows_of
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.plant.plant import unwrapped_eta
@@ -30,6 +31,7 @@ REQUIRED = (interface.ODOM, interface.WRENCH)
 Steps = tuple[np.ndarray, dict[str, np.ndarray]]  # stamps (n,) in ns, role -> values
 SETPOINTS = (interface.CMD_VEL, interface.CMD_ACCEL)
 LATEST = 'latest'
+PAIRED = 0.75  # share of odometry with a set-point of its stamp, from which each should have one
 
 
 class Recording(NamedTuple):
@@ -82,26 +84,73 @@ def open_bag(
     FailedError : no room for temporary files
 
     """
-    bag, contents = Path(bag), read_bag(bag, namespace, whole=whole)
+    bag = Path(bag)
+    contents = read_vehicle(bag, namespace, whole)
     topics = topics_of_one_graph(contents, bag)
     series = {role: contents.messages.pop(topic) for role, topic in topics.items()}
-    series, begun = longest_stretch(series, whole) if contents.lenient else (series, [])
+    series, begun = (series, []) if contents.strict else longest_stretch(series, whole)
     controller = attachments.parameters_of(contents, bag).get('controller_node', {})
     # where the bag does not say it: a controller beside a driver held its set-points
-    held = controller.get('setpoint_pairing', LATEST if contents.lenient else None) == LATEST
-    if held:
+    free = contents.strict is False or (contents.strict is None and _have_own_stamps(series))
+    if held := controller.get('setpoint_pairing', LATEST if free else None) == LATEST:
         series = held_series(series, whole)
-    counts = {role: len(stamps) for role, (stamps, _) in series.items()}
     ns, values = complete(series, whole)
     if len(ns) < 2:
         raise NotOursError(bag, '', 'at least two steps that are complete on all step topics', '0')
-    dropped = [
-        f'{role}: {count - len(ns)} of {count} messages are not complete on all topics'
-        for role, count in counts.items()
-        if count > len(ns) and not (held and role in SETPOINTS)
-    ]
+    counted = {role: stamps for role, (stamps, _) in series.items()
+               if not (held and role in SETPOINTS)}  # fmt: skip
+    dropped = [note for role, stamps in counted.items() for note in _dropped(role, stamps, len(ns))]
     facts = _facts(contents, bag, vehicle, ns, [*begun, *dropped])
     return Recording(_run(ns, values, facts, whole), contents.attachments)
+
+
+def read_vehicle(bag: Path, namespace: str | None, whole: float = math.inf) -> BagContents:
+    """Contents of a bag; what cannot be read of others does not matter where one is complete.
+
+    Parameters
+    ----------
+    bag, namespace, whole : as for `read_bag`
+
+    Raises
+    ------
+    InputError : as for `read_bag`
+
+    """
+    try:
+        return read_bag(bag, namespace, whole=whole)
+    except InputError as error:
+        if namespace is not None:
+            raise
+        found = read_bag(bag, decode=False)
+        ours = {topic for topic, kind in found.types.items()
+                if found.counts.get(topic) and KINDS.get(role_of(topic)) == kind}  # fmt: skip
+        spaces = {space for space in map(namespace_of, ours)
+                  if ours.issuperset(f'{space}{role}' for role in REQUIRED)}  # fmt: skip
+        if found.namespace is not None or len(spaces) != 1 or namespace_of(error.key) in spaces:
+            raise
+        (space,) = spaces
+        contents = read_bag(bag, space, whole=whole)
+        contents.notes.append(f'read the vehicle in {space} alone: {error}')
+        return contents
+
+
+def _have_own_stamps(series: Mapping[str, Series]) -> bool:
+    """Whether set-points came at other times than the odometry between them, on its clock."""
+    odometry, _ = series[interface.ODOM]
+    stamps, _ = series.get(interface.CMD_VEL, series[interface.ODOM])
+    between = odometry[(odometry >= stamps.min()) & (odometry <= stamps.max())]
+    return len(between) > 0 and bool(np.isin(between, stamps).mean() < PAIRED)
+
+
+def _dropped(role: str, stamps: np.ndarray, kept: int) -> list[str]:
+    """Notes on messages with stamps (n,) that are no steps of the run."""
+    if len(stamps) == kept:
+        return []
+    doubled = len(stamps) - len(np.unique(stamps))
+    notes = [f'{role}: {doubled} stamps came again, the first of each is kept'] * bool(doubled)
+    if left := len(stamps) - doubled - kept:
+        notes.append(f'{role}: {left} of {len(stamps)} messages are not complete on all topics')
+    return notes
 
 
 def _facts(
@@ -122,7 +171,7 @@ def _facts(
         'source': 'bag',
         'kinds': attachments.kinds_of(contents, bag),
         'faults': attachments.faults_of(contents, known),
-        'gaps': _gaps(ns) if contents.lenient else (),
+        'gaps': () if contents.strict else _gaps(ns),
         'notes': (*contents.notes, *attachments.notes_on(law), *notes),
     }
 
@@ -234,7 +283,8 @@ def longest_stretch(
     """The part of each topic in which the odometry goes on longest, and notes on what is left out.
 
     Where a clock begins anew, that of every topic does, but for one that has another clock. Before,
-    single messages with a stamp of another time are left out.
+    single messages with a stamp of another time are left out. What only stands in another order is
+    sorted.
 
     Parameters
     ----------
@@ -251,6 +301,8 @@ def longest_stretch(
     edges = cuts[interface.ODOM]
     if len(edges) == 2:
         return found, notes
+    if are_swapped(found[interface.ODOM][0]):
+        return in_order(found, whole), notes
     kept = int(np.argmax(np.diff(edges)))
     times = len(edges) - 2
     notes.append(
@@ -265,6 +317,13 @@ def longest_stretch(
             own = f'{role}: its clock jumps back {len(cuts[role]) - 2} times'
             notes.append(f'{own}: what it says may be of another time')
     return found, notes
+
+
+def in_order(series: Mapping[str, Series], whole: float = math.inf) -> dict[str, Series]:
+    """The series, role -> stamps and rows, by rising stamps."""
+    orders = {role: np.argsort(ns, kind='stable') for role, (ns, _) in series.items()}
+    return {role: (ns[orders[role]], _picked(rows, orders[role], whole))
+            for role, (ns, rows) in series.items()}  # fmt: skip
 
 
 def complete(series: Mapping[str, Series], whole: float = math.inf) -> Steps:

@@ -13,6 +13,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import IO
 
@@ -133,6 +134,16 @@ def strays(ns: np.ndarray, topic: str, notes: list[str]) -> np.ndarray:
     return found
 
 
+def are_swapped(ns: np.ndarray) -> bool:
+    """Whether parts of times (n,) that follow one another only stand in another order.
+
+    Chunks and files may; where a clock began anew, the parts overlap or are apart.
+    """
+    parts = np.split(ns, np.flatnonzero(np.abs(np.diff(ns)) > BACK) + 1)
+    spans = sorted((part.min(), part.max()) for part in parts)
+    return all(0 < other[0] - one[1] <= BACK for one, other in pairwise(spans))
+
+
 def usual_limit(ns: np.ndarray) -> float:
     """Longest pause that is no gap, by the intervals of rising stamps (n,), ns."""
     if len(ns) < 2:
@@ -156,7 +167,8 @@ class BagContents(FileExtent):
     names : recorded topic -> our name of it, where the recorder's topics were remapped
     namespace : that is read: the one asked for, else that of the recorder; None: any
     asked : whether it was asked for
-    lenient : whether a driver was free to say anything: what cannot be used is left out
+    strict : whether every step had to come once and in order; where it had not, a driver was free
+        to say anything, and what cannot be used is left out; None: the bag does not say
 
     """
 
@@ -169,7 +181,7 @@ class BagContents(FileExtent):
     names: dict[str, str] = field(default_factory=dict)
     namespace: str | None = None
     asked: bool = False
-    lenient: bool = False
+    strict: bool | None = None
 
 
 class FileReader:
@@ -226,7 +238,7 @@ class FileReader:
         kept[item.name] = text
         if item.name == RECORDING:
             strict, self._contents.names, namespace = read_recording(text, self._path)
-            self._contents.lenient = not strict
+            self._contents.strict = strict
             if not self._contents.asked:
                 self._contents.namespace = namespace
 
@@ -306,7 +318,7 @@ class FileReader:
     ) -> tuple[int, interface.Frames] | None:
         """The first odometry that may be left in, and its frames."""
         known = self._decoders
-        if not self._contents.lenient:
+        if self._contents.strict is not False:
             i = int(index[0])
             return i, known.frames_of(channel, known.message(table, i, channel))
         for i in index.tolist():
@@ -348,7 +360,7 @@ class FileReader:
                 message = self._decoders.message(table, i, channel)
                 ns, row = self._decoders.value(topic, message, frames if i >= first else None)
             except InputError as error:
-                if not self._contents.lenient:
+                if self._contents.strict is not False:
                     raise
                 self._left_out[topic] += 1
                 self._reasons.setdefault(topic, error.found)

@@ -15,8 +15,13 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.bag import attachments
-from auv_analysis.bag.load import topics_of_one_graph
-from auv_analysis.bag.reading import Series, read_bag
+from auv_analysis.bag.load import (
+    in_order,
+    longest_stretch,
+    read_vehicle,
+    topics_of_one_graph,
+)
+from auv_analysis.bag.reading import Series
 from auv_analysis.bag.step_topics import NotOursError
 from auv_analysis.graph.node_parameters import CONTROLLER
 from auv_dynamics.files.errors import InputError
@@ -181,7 +186,8 @@ def recorded_loop(
     InputError : no bag, no vehicle, no set-points, or topics of another system
 
     """
-    bag, contents = Path(bag), read_bag(bag, namespace)
+    bag = Path(bag)
+    contents = read_vehicle(bag, namespace)
     topics = topics_of_one_graph(contents, bag)
     series = {role: contents.messages[topic] for role, topic in topics.items()}
     if interface.CMD_VEL not in series:
@@ -189,15 +195,17 @@ def recorded_loop(
     parameters = attachments.parameters_of(contents, bag)
     known, own = attachments.vehicle_of(contents, bag, vehicle), parameters.get(CONTROLLER, {})
     controller = RecordedController(own, known, bag, derivatives=interface.CMD_ACCEL in series)
+    begun: list[str] = []
     if controller.settings.lockstep:  # whose clock never begins anew: only chunks may be swapped
-        orders = {role: np.argsort(ns, kind='stable') for role, (ns, _) in series.items()}
-        series = {role: (ns[orders[role]], x[orders[role]]) for role, (ns, x) in series.items()}
+        series = in_order(series)
+    elif not contents.strict:
+        series, begun = longest_stretch(series, math.inf)
     return RecordedLoop(
         series,
         controller,
         attachments.scenario_name(contents, bag),
         attachments.controller_name(parameters, bag),
-        tuple(contents.notes),
+        (*contents.notes, *begun),
     )
 
 

@@ -1,7 +1,9 @@
 """Bags that look like those of other systems: their topics, types, axes, clocks and containers."""
 
 import shutil
+import sqlite3
 from collections.abc import Callable, Iterable
+from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -22,11 +24,14 @@ from helpers.foreign_bags import (
     write_chunks,
     written,
 )
+from mcap.writer import Writer as McapWriter
 from numpy.testing import assert_allclose
+from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
 from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.load import load_run
+from auv_analysis.bag.recover import recover
 from auv_analysis.replay.played_bag import index_bag
 from auv_analysis.replay.played_bag import messages as played_messages
 from auv_analysis.runs.run import Run
@@ -179,6 +184,10 @@ def test_files_of_a_killed_recorder_are_read_by_their_numbers(run, tmp_path) -> 
     span = nanoseconds(seen.t[[0, -1]] + [3.0, 30.0]) + 2_000_000  # when they were logged
     assert [contents.first, contents.last] == span.tolist()
     assert not any('jumps back' in note for note in found.notes)
+    told = yaml.safe_load((tmp_path / '1' / 'metadata.yaml').read_text())
+    told['rosbag2_bagfile_information']['relative_file_paths'] = ['killed_1.db3']
+    (bag / 'metadata.yaml').write_text(yaml.safe_dump(told))  # of before the others
+    assert survey(bag).counts == contents.counts
 
 
 def test_files_that_were_compressed_as_a_whole(run, tmp_path, monkeypatch) -> None:
@@ -201,6 +210,67 @@ def test_files_that_were_compressed_as_a_whole(run, tmp_path, monkeypatch) -> No
     monkeypatch.setattr(shutil, 'disk_usage', lambda _: SimpleNamespace(free=size - 1))
     with pytest.raises(InputError, match=f'at most the {size - 1} bytes .* found {size} bytes'):
         survey(bag)
+
+
+@pytest.mark.parametrize('kind', ['mcap', 'sqlite3'])
+def test_of_a_recorder_that_was_killed_while_it_compressed_files_none_is_left_out(
+    kind, run, tmp_path
+) -> None:
+    messages, _ = cola2(run, Maker())
+    bag = write(tmp_path / 'other', messages, Maker(), kind=kind)
+    (bag / 'metadata.yaml').unlink()
+    (file,) = bag.iterdir()
+    packed = file.with_name(f'other_0{file.suffix}.zstd')
+    packed.write_bytes(b'')
+    for read in (survey, recover)[: 1 + (kind == 'mcap')]:
+        with pytest.raises(InputError, match=f'{packed}: expected files that are all compressed'):
+            read(bag)
+    packed.with_suffix('').write_bytes(file.read_bytes())  # unpacked beside it
+    assert sum(survey(bag).counts.values()) == 4 * run.samples
+
+
+def test_what_a_killed_recorder_had_not_taken_into_its_database_is_not_left_out(
+    run, tmp_path
+) -> None:
+    messages, _ = cola2(run, Maker())
+    (file,) = write(tmp_path / 'one', messages, Maker(), kind='sqlite3').glob('*.db3')
+    with closing(sqlite3.connect(file)) as recorder:
+        recorder.execute('PRAGMA journal_mode=WAL')
+        recorder.execute('DELETE FROM messages WHERE id % 2')
+        recorder.commit()
+        killed = Path(shutil.copytree(file.parent, tmp_path / 'killed'))
+    (killed / 'metadata.yaml').unlink()
+    copy = killed / file.name
+    for path in (killed, copy):
+        with pytest.raises(
+            InputError, match=f'expected nothing in {file.name}-wal: sqlite3 {file.name}'
+        ):
+            survey(path)
+    with closing(sqlite3.connect(copy)) as mended:
+        mended.execute('PRAGMA wal_checkpoint')
+    assert sum(survey(killed).counts.values()) == run.samples
+
+
+@pytest.mark.parametrize(
+    ('language', 'text'), [('unknown', b''), ('ros2msg', b''), ('ros2idl', b'module m {};')]
+)
+def test_types_of_ros_are_known_where_rosbag2_had_no_definition_of_them(
+    language, text, run, tmp_path
+) -> None:
+    maker, m = Maker(), motion(run, enu=False)
+    writer, channels = McapWriter(str(tmp_path / 'bag.mcap')), {}
+    writer.start(profile='ros2', library='test')
+    for topic, log, one in simple(m, maker, '/odom', '/wrench', ('odom_ned', 'base_link_fsd')):
+        if topic not in channels:
+            schema = writer.register_schema(one.__msgtype__, language, text)
+            channels[topic] = writer.register_channel(topic, 'cdr', schema)
+        data = bytes(maker.store.serialize_cdr(one, one.__msgtype__))
+        writer.add_message(channels[topic], log, data, log)
+    writer.finish()
+    assert_allclose(load_run(tmp_path / 'bag.mcap', 'rexrov').tau, run.tau)
+    if not text:
+        found = loaded(tmp_path / 'bag.mcap', odometry='/odom', wrench='/wrench')
+        assert_allclose(found.nu, run.nu, atol=1e-9)
 
 
 def test_an_mcap_that_was_not_finished_is_read_as_far_as_it_goes(run, tmp_path) -> None:
@@ -238,6 +308,12 @@ def test_messages_that_were_compressed_one_by_one(run, tmp_path) -> None:
     found = loaded(bag, odometry='/odom', wrench='/wrench')
     assert_allclose(found.nu, run.nu, atol=1e-9)
     assert_allclose(load_run(bag, 'rexrov').tau, run.tau)
+    (bag / 'metadata.yaml').unlink()
+    assert recover(bag).metadata == 'written'
+    with AnyReader([bag]) as reader:  # which takes it from there that they are compressed
+        stamps = [reader.deserialize(data, one.msgtype).header.stamp
+                  for one, _, data in reader.messages()]  # fmt: skip
+    assert len(stamps) == 2 * run.samples
     played = list(played_messages(index_bag(bag), ['/odom', '/wrench']))
     assert {message.data[:4] for message in played} == {b'\0\1\0\0'}
 

@@ -25,6 +25,7 @@ from auv_analysis.bag.metadata import (
     is_csv,
     is_log,
     is_mcap,
+    refuse_packed,
     split_order,
 )
 from auv_analysis.bag.reading import BagContents, read_bag
@@ -179,13 +180,18 @@ def _of_connection(bag: Path, connection: 'Connection') -> Decoder:
 
 
 def _parts(bag: Path) -> list[Path]:
-    """What rosbags opens: a folder whose recorder was killed has no metadata, but its files."""
+    """What rosbags opens: its files, where a folder has no metadata or one that lacks some of them.
+
+    No metadata is what a recorder leaves that was killed.
+    """
     if not bag.is_dir():
         return [bag]
-    if (bag / 'metadata.yaml').exists():
-        _check_metadata(bag)
-        return [bag]
     files = sorted(bag.glob('*.db3'), key=split_order)
+    if (bag / 'metadata.yaml').exists():
+        listed = {name.removesuffix('.zstd') for name in _listed(bag)}
+        if listed.issuperset(file.name for file in files):
+            return [bag]
+    refuse_packed(bag, files)
     if not files:
         raise InputError(bag, '', 'a metadata.yaml beside compressed files', 'none')
     for file in files:
@@ -193,8 +199,8 @@ def _parts(bag: Path) -> list[Path]:
     return files
 
 
-def _check_metadata(bag: Path) -> None:
-    """Refuse a metadata.yaml that leads out of its folder or decompresses to more than fits."""
+def _listed(bag: Path) -> list[str]:
+    """Names of the files that metadata.yaml lists; InputError: outside, or more than fits."""
     path = bag / 'metadata.yaml'
     check_regular(path, bag)
     told = read_yaml(path, 'metadata').get('rosbag2_bagfile_information')
@@ -209,6 +215,7 @@ def _check_metadata(bag: Path) -> None:
         check_regular(file, bag)
         if str(told.get('compression_mode', '')).lower() == 'file':
             _check_size(file)
+    return [Path(name).name for name in listed]
 
 
 def _check_size(file: Path) -> None:
@@ -225,6 +232,15 @@ def _check_size(file: Path) -> None:
         raise InputError(file, '', expected, 'no size' if size < 0 else f'{size} bytes')
 
 
+def _check_closed(file: Path) -> None:
+    """Refuse an SQLite file of a killed recorder whose last messages still lie beside it."""
+    beside = file.with_name(f'{file.name}-wal')
+    if beside.is_file() and beside.stat().st_size:
+        remedy = f'sqlite3 {file.name} "PRAGMA wal_checkpoint"'
+        expected = f'nothing in {beside.name}: {remedy} takes it in'
+        raise InputError(file, '', expected, f'{beside.stat().st_size} bytes')
+
+
 def _is_ros1(bag: Path) -> bool:
     return bag.suffix == '.bag' and not bag.is_dir()
 
@@ -234,6 +250,8 @@ def _opened(bag: Path) -> Iterator[Any]:
     """An open reader of the rosbags library."""
     from rosbags import rosbag1, rosbag2  # loads slowly, and is not needed for MCAP
 
+    for file in [bag] if bag.is_file() else bag.glob('*.db3'):
+        _check_closed(file)
     try:
         reader: Any = rosbag1.Reader(bag) if _is_ros1(bag) else rosbag2.Reader(bag)
         reader.open()
@@ -266,7 +284,8 @@ def decoder(name: str, definition: str, language: str, encoding: str) -> Decoder
     """
     from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
-    if encoding not in ('cdr', 'ros1') or language not in ('msg', 'idl'):
+    known = language in ('msg', 'idl') or (name and not definition)
+    if encoding not in ('cdr', 'ros1') or not known:
         raise ValueError(f'messages in {encoding or "no encoding"}, described in {language}')
     if len(definition) > LARGEST_PARSED:
         raise ValueError(f'a definition of {len(definition)} bytes, above {LARGEST_PARSED}')

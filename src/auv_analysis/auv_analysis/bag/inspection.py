@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema, Statistics
+from zstandard import FRAME_HEADER
 
 from auv_analysis.bag.chunks import MessageTable, by_channel
 from auv_analysis.bag.mcap_file import Lost, McapFile, MessageIndex, Read
@@ -208,6 +209,7 @@ class Inspection:
     lost : bytes that cannot be used
     faults : what else is wrong, a few words each; empty: the file is healthy
     compression : of its first chunk, None: it has no chunks
+    packed : whether rosbag2 compressed each message by itself
 
     """
 
@@ -219,6 +221,7 @@ class Inspection:
         self.attachments: list[tuple[str, int]] = []
         self.lost: list[Lost] = []
         self.compression: str | None = None
+        self.packed = False
         self._told: int | None = None  # number of messages by the statistics
         self._orphans = 0  # messages in indices whose chunk is lost
         self._data_end, self._footer, self._is_rosbag2 = False, False, False
@@ -270,6 +273,7 @@ class Inspection:
         trust = CHUNK if in_chunk else SUMMARY if self._data_end else BETWEEN
         for part in item.parts:
             if isinstance(part, MessageTable):
+                self.packed = self.packed or part.payload(0).startswith(FRAME_HEADER)
                 for channel, index in by_channel(part.channels):
                     spacing = self.spacings.setdefault(channel, Spacing())
                     spacing.add(part.log_times[index].astype(np.int64))

@@ -1,7 +1,7 @@
 """The files of a bag, and what its metadata.yaml and recording.yaml say of it."""
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from auv_dynamics.files.yaml_files import parse_yaml, yaml_text
 
 DISTRO = 'jazzy'
 BAG = 'a bag: a folder, an .mcap, a .db3 or a ROS 1 .bag file, or a .csv, .tlog or .BIN file'
+IN_FOLDERS = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd')  # endings of files of a bag
 TABLES, LOGS = ('.csv', '.tsv'), ('.tlog', '.bin')
 OTHERS = ('.db3', '.bag', *TABLES, *LOGS)  # endings of files that McapFile does not read
 METADATA = 'metadata.yaml'
@@ -83,13 +84,16 @@ class TopicExtent:
         return (self.count - 1) / max(self.last - self.first, 1) * 1e9
 
 
-def metadata(definitions: Iterable[Definition], extents: Sequence[FileExtent]) -> dict[str, Any]:
+def metadata(
+    definitions: Iterable[Definition], extents: Sequence[FileExtent], *, packed: bool = False
+) -> dict[str, Any]:
     """What stands below `rosbag2_bagfile_information`.
 
     Parameters
     ----------
     definitions : of the topics
     extents : of the files, in their order
+    packed : whether each message is compressed by itself
 
     """
     counts: dict[str, int] = {}
@@ -107,8 +111,8 @@ def metadata(definitions: Iterable[Definition], extents: Sequence[FileExtent]) -
             {'topic_metadata': _about(definition), 'message_count': counts.get(definition.topic, 0)}
             for definition in definitions
         ],
-        'compression_format': '',
-        'compression_mode': '',
+        'compression_format': 'zstd' if packed else '',
+        'compression_mode': 'message' if packed else '',
         'relative_file_paths': [extent.name for extent in extents],
         'files': [
             {'path': e.name, **_span(e.first, e.last, sum(e.counts.values()))} for e in extents
@@ -210,7 +214,18 @@ def bag_files(bag: str | Path) -> list[Path]:
         raise InputError(path, '', 'a bag folder or an .mcap file', found)
     for file in files:
         check_regular(file, path if is_folder else file.resolve().parent)
+    if is_folder:
+        refuse_packed(path, files)
     return files
+
+
+def refuse_packed(folder: Path, files: Collection[Path]) -> None:
+    """Refuse files that rosbag2 compressed as a whole beside those that it had not come to."""
+    first = min(files, default=folder)
+    for packed in sorted(folder.glob(f'*{first.suffix}.zstd')) if files else ():
+        if packed.with_suffix('') not in files:
+            expected = 'files that are all compressed, or none (zstd -d unpacks them)'
+            raise InputError(packed, '', expected, f'others that are not: {first.name}')
 
 
 def check_regular(path: Path, folder: Path) -> None:

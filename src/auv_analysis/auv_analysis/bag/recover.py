@@ -26,6 +26,7 @@ from auv_analysis.bag.metadata import (
     check_regular,
     counts_in,
     metadata,
+    refuse_packed,
     split_order,
     write_metadata,
 )
@@ -82,7 +83,8 @@ class Rewriter:
             for channel in known.definitions.channels():
                 self._channel(channel.id)
             if definitions is not None:
-                text = as_text(metadata(definitions, [known.extent(self._name)]))
+                extents = [known.extent(self._name)]
+                text = as_text(metadata(definitions, extents, packed=known.packed))
                 self._writer.add_metadata(ROSBAG2, {'serialized_metadata': text})
             self._writer.finish()
             synced(file)
@@ -173,6 +175,8 @@ def _sources(bag: Path) -> dict[Path, Path]:
     if not folder.is_dir():
         raise InputError(bag, '', EXPECTED, 'no such file or folder')
     found = {path: path for path in folder.glob('*.mcap')}
+    if bag.is_dir():
+        refuse_packed(bag, found)
     kept = [(match, path) for path in folder.iterdir() if (match := KEPT.fullmatch(path.name))]
     for match, path in sorted(kept, key=lambda pair: int(pair[0]['number'] or 1)):
         target = folder / match['target']
@@ -240,7 +244,8 @@ def _settle_metadata(folder: Path, report: Report) -> str:
         for definition in found:
             definitions.setdefault(definition.topic, definition)
     extents = [one.extent(name) for name, one in zip(names, inspections, strict=True)]
-    document = metadata(definitions.values(), extents)
+    packed = any(one.packed for one in inspections)
+    document = metadata(definitions.values(), extents, packed=packed)
     try:
         told = read_yaml(folder / METADATA, 'metadata')[ROOT]
         if _gist(told) == _gist(document):
@@ -248,8 +253,8 @@ def _settle_metadata(folder: Path, report: Report) -> str:
     except (InputError, LookupError, TypeError, AttributeError):
         told = {}
     told = told if isinstance(told, dict) else {}
-    packed = str(told.get('compression_mode', '')).lower() == 'message'  # files are not, any more
-    kept = ['compression_format', 'compression_mode'] if packed else []
+    mode = str(told.get('compression_mode', '')).lower()  # of files: they are not, any more
+    kept = ['compression_format', 'compression_mode'] if mode == 'message' else []
     for key in (*kept, 'custom_data', 'ros_distro'):
         if told.get(key):
             document[key] = told[key]

@@ -19,6 +19,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 from auv_analysis.bag.chunks import MessageTable, gather
 from auv_analysis.bag.limits import LARGEST_PARSED
+from auv_analysis.bag.ros2msg import schema_text
 from auv_dynamics.files.errors import InputError, first_line
 from auv_dynamics.ros import interface
 
@@ -104,6 +105,8 @@ class Decoding:
         """Decoder of a channel; channels of one definition share it."""
         if schema is None:
             return None
+        if schema.encoding == 'ros2idl' or not schema.data:
+            schema = self._standard(channel, schema)
         key = channel.message_encoding, schema.name, schema.encoding, schema.data
         if key not in self._known:
             self._parsed += len(schema.data)
@@ -117,6 +120,13 @@ class Decoding:
                 raise refusal(self._path, channel.topic, 'a schema of its type', error) from None
             self._known[key] = decoder
         return self._known[key]
+
+    def _standard(self, channel: Channel, schema: Schema) -> Schema:
+        """Schema of one of our types by its name, where rosbag2 had no .msg file of it."""
+        try:
+            return Schema(schema.id, schema_text(schema.name).encode(), 'ros2msg', schema.name)
+        except OSError as error:
+            raise refusal(self._path, channel.topic, 'a schema of its type', error) from None
 
     def __contains__(self, channel: int) -> bool:
         return channel in self._decoders

@@ -944,9 +944,10 @@ def test_in_real_time_a_message_without_a_stamp_begins_no_run(tmp_path: Path, ti
     assert len(logged(tmp_path / 'bag')['/wrench']) == 21
 
 
+@pytest.mark.parametrize('withheld', ['one', 'all'])
 @pytest.mark.parametrize(('strict', 'ends'), [(False, True), (True, False)])
 def test_in_real_time_the_last_measurement_need_not_come(
-    tmp_path: Path, timers, monkeypatch: pytest.MonkeyPatch, strict: bool, ends: bool
+    tmp_path: Path, timers, monkeypatch: pytest.MonkeyPatch, strict: bool, ends: bool, withheld: str
 ) -> None:
     with program() as made:
         node = recorder_in(made, tmp_path / 'bag', strict=strict, duration=0.2, analysis_every=4)
@@ -954,7 +955,13 @@ def test_in_real_time_the_last_measurement_need_not_come(
         monkeypatch.setattr(recorder_node, 'PATIENCE', -1.0)
         timers[0]()
         assert node.exit_code is None, 'no topic has come to the last step'
-        give(node, 'wrench', convert.wrench(20 * STEP, (0.0,) * 6, FRAMES))
+        if withheld == 'one':
+            give(node, 'wrench', convert.wrench(20 * STEP, (0.0,) * 6, FRAMES))
+        else:
+            give_clock(node, 19 * STEP)
+            timers[0]()
+            assert node.exit_code is None, 'nor the clock'
+            give_clock(node, 20 * STEP)
         monkeypatch.setattr(recorder_node, 'PATIENCE', math.inf)
         timers[0]()
         assert node.exit_code is None, 'the other one may be under way'

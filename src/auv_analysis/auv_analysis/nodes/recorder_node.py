@@ -79,6 +79,10 @@ class StepLedger:
         """Last step that has arrived on any of them."""
         return max(self._newest.values())
 
+    def reaches(self, last: int, clock: int) -> bool:
+        """Whether a step has arrived on any of them, or a clock, ns, has come to it."""
+        return self.furthest >= last or clock >= self._origin + last * self._step
+
     @property
     def complete_ns(self) -> int:
         """Stamp of that step."""
@@ -246,13 +250,15 @@ class RecorderNode(BulkNode):
     def _is_whole(self, last: int) -> bool:
         """Whether all has come to the last step, or what need not come has stayed away.
 
-        In real time that is any topic: a measurement may be withheld. In lock-step it is the clock.
+        In real time that is any topic, for a measurement may be withheld; of all of them where the
+        clock has come to the last step. In lock-step it is the clock.
         """
         due, newest = self._last_due, self._newest
         analysed = due is None or newest[topics.LUMPED_ERROR.name] >= due
         late = time.monotonic() - self._heard > PATIENCE
         if self._ledger.complete < last or not analysed:
-            return late and not self._settings.strict and self._ledger.furthest >= last
+            reached = self._ledger.reaches(last, newest[topics.CLOCK.name])
+            return late and not self._settings.strict and reached
         return late or not 0 <= newest[topics.CLOCK.name] < self._ledger.complete_ns
 
     def _say_progress(self) -> None:

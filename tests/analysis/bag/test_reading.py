@@ -22,8 +22,9 @@ from helpers.strategies import examples
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
-from auv_analysis.bag import chunks, step_topics
-from auv_analysis.bag.mcap_file import MAGIC
+from auv_analysis.bag import chunks, mcap_file, step_topics
+from auv_analysis.bag.chunks import MessageTable
+from auv_analysis.bag.mcap_file import MAGIC, McapFile
 from auv_analysis.bag.metadata import bag_files
 from auv_analysis.bag.reading import BagContents, read_bag
 from auv_dynamics.files.errors import InputError
@@ -307,6 +308,16 @@ def test_messages_without_a_channel_are_refused(tmp_path: Path) -> None:
     bag._writer.add_message(77, 0, data, 0)
     with pytest.raises(InputError, match='channel 77: expected a channel before its messages'):
         read_bag(bag.close())
+
+
+def test_of_long_messages_without_chunks_few_are_held(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(mcap_file, 'HEAVY', 30_000)
+    bag, image = Bag(tmp_path / 'bag.mcap', use_chunking=False), TYPES.types[STRING]('x' * 10_000)
+    for ns in range(10):
+        bag.add('/image', STRING, ns, serialized(image))
+    tables = [item for item in McapFile(bag.close()).records() if isinstance(item, MessageTable)]
+    assert max(len(table.data) for table in tables) < 50_000
+    assert [int(ns) for table in tables for ns in table.log_times] == [*range(10)]
 
 
 def test_files_of_a_bag_come_by_their_numbers(tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ DAMAGES = (  # what reading a damaged record may end in
     *(McapError, EndOfFile, ZstdError, struct.error, ValueError, KeyError),
     *(OverflowError, RuntimeError, MemoryError),
 )
-TOGETHER = 4096  # messages outside chunks that are read together
+TOGETHER, HEAVY = 4096, 1 << 24  # messages outside chunks, and bytes, that are read together
 LONG_HEAD = 1 << 16  # bytes of a long attachment that are read for its name
 KINDS: dict[int, Any] = {
     Opcode.HEADER: Header,
@@ -451,12 +451,15 @@ class McapFile:
 def _with_tables(items: Iterable[Read | Lost | Frame]) -> Iterator[Read | Lost]:
     """The same with the frames of messages that follow one another read as tables."""
     waiting: list[Frame] = []
+    size = 0
     for item in items:
-        if waiting and (len(waiting) == TOGETHER or not isinstance(item, Frame)):
+        is_full = len(waiting) == TOGETHER or size > HEAVY
+        if waiting and (is_full or not isinstance(item, Frame)):
             yield _joined(waiting)
-            waiting = []
+            waiting, size = [], 0
         if isinstance(item, Frame):
             waiting.append(item)
+            size += len(item.body)
         else:
             yield item
     if waiting:

@@ -128,6 +128,11 @@ def test_every_kind_of_argument(folder: Path, results: Path) -> None:
     (folder / 'theirs').mkdir()
     (folder / 'theirs/theirs_0.db3').write_bytes(b'')
     assert kinds('theirs') == kinds('theirs/theirs_0.db3') == [('bag', '')]
+    for name, ending in (('one', 'mcap.zstd'), ('other', 'db3.zstd'), ('third', 'db3')):
+        (folder / 'dives' / name).mkdir(parents=True)
+        (folder / f'dives/{name}/{name}_0.{ending}').write_bytes(b'')
+        assert kinds(f'dives/{name}') == [('bag', '')]
+    assert kinds('dives') == 3 * [('bag', '')]
     (results / 'gvc.npz').unlink()
     assert kinds('runs/short', 'case2') == [*both[1:], ('scenario', 'gvc'), ('scenario', 'cl')]
 

@@ -1,7 +1,7 @@
 """What `auv analyze` is given: bags, samples, folders of results, scenarios; sweeps apart."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, NamedTuple, Protocol
@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple, Protocol
 from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.foreign_topics import TopicMap, other_odometries, with_candidates
 from auv_analysis.bag.load import Recording, open_bag
-from auv_analysis.bag.metadata import OTHERS, files_of, is_csv, is_mcap
+from auv_analysis.bag.metadata import IN_FOLDERS, files_of, is_csv, is_mcap
 from auv_analysis.bag.step_topics import NotOursError
 from auv_analysis.output.folder import SWEEP
 from auv_analysis.runs.run import Hold, Run
@@ -156,10 +156,10 @@ def _of_folder(folder: Path) -> list[RunSource]:
         entries = sorted(folder.iterdir())
     except OSError as error:
         raise InputError(folder, '', EXPECTED, reason(error)) from None
-    if any(entry.suffix in ('.mcap', OTHERS[0]) for entry in entries):
+    if _make_a_bag(entries):
         return [RunSource('bag', folder)]
     names = _controllers(folder)
-    bags = [e for e in entries if e.is_dir() and any(e.glob('*.mcap'))]
+    bags = [entry for entry in entries if entry.is_dir() and _make_a_bag(entry.glob('*'))]
     samples = [folder / f'{name}{ENDING}' for name in names]
     samples = [path for path in samples if path.is_file()]
     if bags and samples:
@@ -175,6 +175,11 @@ def _of_folder(folder: Path) -> list[RunSource]:
     order = {name: i for i, name in enumerate(names)}
     bags.sort(key=lambda bag: order.get(bag.name, len(order)))
     return [RunSource('bag', bag) for bag in bags]
+
+
+def _make_a_bag(files: Iterable[Path]) -> bool:
+    """Whether any of them is one of those that a bag in a folder consists of."""
+    return any(file.name.endswith(IN_FOLDERS) for file in files)
 
 
 def _controllers(folder: Path) -> list[str]:

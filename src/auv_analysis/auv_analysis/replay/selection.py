@@ -24,7 +24,8 @@ COMMANDS = (interface.WRENCH, interface.CMD_VEL, interface.CMD_ACCEL)
 MEASURED = (interface.WRENCH_APPLIED, interface.DISTURBANCE, interface.DISTURBANCE_ESTIMATE)
 FORCES = (WRENCH, WRENCH.removesuffix('Stamped'))
 WORDS = re.compile(
-    '(^|[/_])(cmd|commands?|setpoints?|wrench|thrust|thrusters?|actuators?|servo|override)[0-9]*([/_]|$)'
+    '(^|[/_])(cmd|commands?|setpoints?|wrench|thrusts?|thrusters?|actuators?|servos?|motors?|'
+    'propellers?|pwm|escs?|override)[0-9]*([/_]|$)'
 )
 UNWANTED = 'not asked for'
 

@@ -137,15 +137,16 @@ def test_logged_times_are_put_on_another_clock() -> None:
     assert on_the_clock(logged, near, []) is logged, 'one clock and a delay'
 
 
-def test_logged_times_follow_the_stretch_of_the_clock_that_is_read() -> None:
+@pytest.mark.parametrize('role', ['odometry', 'pose'])
+def test_logged_times_follow_the_stretch_of_the_clock_that_is_read(role) -> None:
     seconds = np.array([*range(6), *range(9)])
     log = (100 + np.arange(15)) * SECOND
-    clock = recorded(seconds * SECOND, 'odometry', log)
-    others = {role: recorded(log, role, stamped=False) for role in ('twist', 'wrench')}
-    found = _on_one_clock({**others, 'odometry': clock}, [])
-    for role in others:
-        assert_array_equal(found[role].stamps, np.arange(9) * SECOND)
-        assert_array_equal(found[role].rows[:, 0], np.arange(6, 15))
+    clock = recorded(seconds * SECOND, role, log)
+    others = {other: recorded(log, other, stamped=False) for other in ('twist', 'wrench')}
+    found = _on_one_clock({**others, role: clock}, [])
+    for other in others:
+        assert_array_equal(found[other].stamps, np.arange(9) * SECOND)
+        assert_array_equal(found[other].rows[:, 0], np.arange(6, 15))
 
 
 def test_no_line_leads_from_a_single_message() -> None:

@@ -141,7 +141,7 @@ def _without_rates(twist: Track) -> Track:
 def _on_one_clock(found: Mapping[str, Recorded], notes: list[str]) -> dict[str, Recorded]:
     """The same with rising stamps of one clock that does not start anew."""
     moving = [one for one in found.values() if one.source.role in MOVING]
-    moving = moving or [one for one in found.values() if one.source.role == 'pose']
+    moving += [one for one in found.values() if one.source.role == 'pose']
     clock = next((one for one in moving if one.stamped), moving[0])
     kept = longest_stretch(clock, [])
     timed = {role: on_the_clock(one, kept, notes) for role, one in found.items()}

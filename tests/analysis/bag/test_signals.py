@@ -312,6 +312,7 @@ def test_an_odometry_of_zeros_is_said_and_one_that_stands_still_is_none(run, tmp
     ({'frames': None}, r"/o: frame_id: expected --frames ned_fsd or enu_flu.*'odom', 'base_link'$"),
     ({'step': 4e-5}, r'options: step: expected at least 5e-05 s, of which 200 .*, found 4e-05$'),
     ({'vehicle': None}, r'^options: vehicle \(--vehicle\): expected a vehicle file or a shipped'),
+    ({'rates': 'from attitude', 'gap': 1e-3}, r'/o: expected 9 attitudes without a .* none$'),
 ])  # fmt: skip
 def test_what_does_not_fit_is_refused_in_one_line(keys, line, run, tmp_path) -> None:
     bag = write(tmp_path / 'other', messages(run), Maker())

@@ -91,6 +91,9 @@ def tracks_of(
     if mapping.rates == FROM_ATTITUDE:
         others = [_without_rates(one) for one in twists[1:] if one.given[:3].any()]
         twists = [with_rates(twists[0], pose, notes), *others]
+        if not len(twists[0].ns):
+            expected = f'{SMALLEST} attitudes without a gap at a velocity, for their rate'
+            raise InputError(bag, pose.topic, expected, 'none')
     tracks = {'pose': pose, 'twist': assembled(twists, bag)}
     for role, every in by_role.items():
         if role == 'thrusters':

@@ -101,9 +101,10 @@ def test_empty_cells_are_no_values(run, tmp_path) -> None:
     assert 'dive: 75 of 101 messages were left out' in '\n'.join(notes)
 
 
-def test_decimals_with_a_comma(tmp_path) -> None:
+@pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'utf-16'])
+def test_decimals_with_a_comma(encoding, tmp_path) -> None:
     path = tmp_path / 'x.csv'
-    path.write_text('t;u\n0,5;-1,25e-1\n1;2.5\n')
+    path.write_text('t;u\n0,5;-1,25e-1\n1;2.5\n', encoding)
     found = [(m.message.t, m.message.u) for m in messages(path, ['x'], [])]
     assert found == [(0.5, -0.125), (1.0, 2.5)]
 

@@ -4,6 +4,7 @@ import contextlib
 import csv
 import math
 import os
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import chain, islice
 from pathlib import Path
@@ -114,7 +115,10 @@ class Table:
         self._number = 0  # of the line that was read
         self._first: list[str] = []  # line of numbers that was read with the head
         try:
-            self._stream = file.open(encoding='utf-8-sig', errors='replace', newline='')
+            with file.open('rb') as stream:
+                is_wide = stream.read(2) in (BOM_UTF16_LE, BOM_UTF16_BE)  # as Windows writes it
+            encoding = 'utf-16' if is_wide else 'utf-8-sig'
+            self._stream = file.open(encoding=encoding, errors='replace', newline='')
         except OSError as error:
             raise InputError(file, '', 'a CSV file', reason(error)) from None
         try:

@@ -116,6 +116,7 @@ def bounds_of(options: argparse.Namespace, vehicle: Vehicle) -> Bounds:
 
     from auv_analysis.studies.excite.drive import Bounds
     from auv_dynamics.files.errors import InputError
+    from auv_dynamics.vehicle import DOFS
 
     rate = options.rate or 2.0 * options.speed
     if options.limit is not None and len(options.limit) not in (1, 6):
@@ -123,7 +124,8 @@ def bounds_of(options: argparse.Namespace, vehicle: Vehicle) -> Bounds:
     if options.limit is not None:
         wrench = np.broadcast_to(np.array(options.limit), 6)
     elif vehicle.thrusters is not None:
-        wrench = SHARE * vehicle.thrusters.largest()
+        alone = [dof not in vehicle.thrusters.unactuated() for dof in DOFS]
+        wrench = SHARE * vehicle.thrusters.largest() * alone
     else:
         nu = np.repeat([options.speed, rate], 3)
         tilted = np.array([0.0, 0.0, 0.0, 0.5 * TILT, 0.5 * TILT, 0.0])

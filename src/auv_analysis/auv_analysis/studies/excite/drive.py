@@ -289,6 +289,7 @@ def motion_of(
 def _closed(request: Request, waves: Harmonics, errors: Sequence[dict[str, Any]]) -> Motion:
     """Motions of closed loops, without noise: that of the sensors is no part of the plan."""
     commands, states = [], []
+    driven = request.bounds.wrench > 0.0  # what a law asks for of other axes never acts
     checked: Scenario | None = None  # the first: others differ in amplitudes and model error alone
     for error in errors:
         for b in range(len(waves.offset)):
@@ -298,7 +299,7 @@ def _closed(request: Request, waves: Harmonics, errors: Sequence[dict[str, Any]]
             checked = checked or scenario_in_memory(request, data)
             scenario = replace(checked, data=resolved(data))
             command, state = recorded(scenario, CONTROLLER[True])
-            commands.append(command)
+            commands.append(np.where(driven, command, 0.0))
             states.append(state)
     shape = len(errors), len(waves.offset)
     return Motion(*(np.reshape(part, (*shape, *part[0].shape)) for part in (commands, states)))

@@ -56,7 +56,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
     scenario = load_scenario(options.scenario)
     request = _request(options, scenario)
-    asked = Perturbations(options.samples, spread_of(options.spread or ()), request.seed)
+    spread = spread_of(options.spread or (), scenario.vehicle)
+    asked = Perturbations(options.samples, spread, request.seed)
     out = options.out or Path('runs') / f'tune_{scenario.name}'
     with results_folder(out, overwrite=options.overwrite, inputs=scenario.inputs) as results:
         for warning in scenario.warnings:

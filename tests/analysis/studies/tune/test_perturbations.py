@@ -150,7 +150,8 @@ def test_every_controller_meets_the_same_draws(tmp_path) -> None:
 
 
 def test_spread_of_the_command_line() -> None:
-    assert spread_of(['mass=0', 'waves=2.5']) == Spread(mass=0.0, waves=2.5)
+    vehicle = REXROV.vehicle
+    assert spread_of(['mass=0', 'waves=2.5'], vehicle) == Spread(mass=0.0, waves=2.5)
     every = {'mass', 'added_mass', 'damping', 'buoyancy', 'inertia', 'disturbance', 'waves',
              'current'}  # fmt: skip
     assert applicable(Spread(), REXROV.vehicle).keys() == every - {'inertia'}
@@ -162,7 +163,11 @@ def test_spread_of_the_command_line() -> None:
         ('waves=nan', 'found nan'), ('current=inf', 'found inf'),
     ):  # fmt: skip
         with pytest.raises(InputError, match=match):
-            spread_of([text])
+            spread_of([text], vehicle)
+    with pytest.raises(InputError, match=r'one of damping, buoyancy, inertia, .* found mass=0\.1'):
+        spread_of(['mass=0.1'], HERMAN.vehicle)  # whose M_RB and M_A are not apart
+    with pytest.raises(InputError, match=r'found inertia=0\.1'):
+        spread_of(['inertia=0.1'], vehicle)
 
 
 def test_errors_that_leave_no_plant_are_one_line(tmp_path) -> None:

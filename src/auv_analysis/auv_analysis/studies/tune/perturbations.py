@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -55,16 +55,16 @@ class Perturbations:
     seed: int
 
 
-def spread_of(texts: Iterable[str]) -> Spread:
+def spread_of(texts: Iterable[str], vehicle: Vehicle) -> Spread:
     """Spread of the command line: NAME=VALUE each, the others as they are.
 
     Raises
     ------
-    InputError : no such name, no number, or one that is out of bounds
+    InputError : no such name for this vehicle, no number, or one that is out of bounds
 
     """
-    known = [entry.name for entry in fields(Spread)]
     spread = Spread()
+    known = applicable(spread, vehicle)
     for text in texts:
         name, _, value = text.partition('=')
         try:

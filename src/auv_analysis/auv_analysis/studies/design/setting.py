@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from auv_analysis.output.text import join, number, plain
 from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.scaling import REFERENCE, scaled_case1
 from auv_analysis.scenario.scenario import Scenario, load_scenario, scenario_from
+from auv_analysis.scenario.scenario import write_inputs as write_files
 from auv_analysis.simulation.simulate import simulate
 from auv_analysis.studies.design.change import ChangeSpace, disc_mass, normal_of, parts_of, spread
 from auv_analysis.studies.design.prediction import Sizes, sizes_of
@@ -279,15 +280,9 @@ def write_inputs(setting: Setting, x: np.ndarray | None, target: str, out: Path)
             'vehicle_before.yaml beside it is the vehicle as it was, with its comments.'
         )
         text = changed_text(changed_data(setting.space, x, words), about)
-    (out / 'vehicle.yaml').write_text(text, encoding='utf-8')
-    data = dict(setting.scenario.data)
-    data['vehicle'] = 'vehicle.yaml'
-    data['name'] = f'{data["name"][:LONGEST]}_changed'
-    if 'setpoint.csv' in setting.scenario.attachments:
-        data['setpoint'] = {'file': 'setpoint.csv'}
-        csv = setting.scenario.attachments['setpoint.csv']
-        (out / 'setpoint.csv').write_text(csv, encoding='utf-8')
-    header = f'# {setting.scenario.name} with the vehicle beside it, every default filled in\n'
-    body = yaml_text(data)
-    (out / 'scenario.yaml').write_text(header + body, encoding='utf-8')
-    return load_scenario(out / 'scenario.yaml')
+    one = setting.scenario
+    changed = replace(
+        one, path=Path(one.name), data={**one.data, 'name': f'{one.name[:LONGEST]}_changed'},
+        attachments={**one.attachments, 'vehicle.yaml': text},
+    )  # fmt: skip
+    return load_scenario(write_files(changed, out)['scenario.yaml'])

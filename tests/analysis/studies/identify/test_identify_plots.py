@@ -87,6 +87,7 @@ def test_an_identification(tmp_path) -> None:
         assert (x[0], x[-1]) == (one.values[0], one.values[-1])
         assert levels(axes) == [pytest.approx(1.96**2)]
         assert axes.get_xlabel() == ('M.surge (kg)' if one.unit else 'lag')
+    assert identify.prediction([])[0] is None, 'nothing was held out'
     found.profiles *= 2
     grid = identify._profiles(found)[0].axes[0].get_subplotspec().get_gridspec()
     assert grid.get_geometry() == (2, 3)
@@ -131,5 +132,19 @@ def test_spectra_of_residuals_are_one_where_they_are_white(tmp_path) -> None:
     for segment, _ in pairs:
         segment.at = 2.0 * segment.at
     ((f, p),) = map(points, artists.lines(identify._residuals(found, pairs)[0].axes[0]))
-    assert f == pytest.approx(10.0 / 40.0 * np.arange(1, 20)), 'measured at half the rate'
+    assert f == pytest.approx(10.0 / 40.0 * np.arange(1, 21)), 'measured at half the rate'
     assert np.mean(p) == pytest.approx(1.0, abs=0.25)
+
+
+def test_spectra_of_unlike_recordings_are_averaged_by_frequency() -> None:
+    """Residuals of 2 Hz, measured at 20 and at 5 Hz."""
+    found, _, _ = _identified()
+    pairs = []
+    for apart, count in ((1.0, 80), (4.0, 100)):
+        at = apart * np.arange(count)
+        waves = np.sin(4.0 * np.pi * 0.05 * at)
+        pairs.append((Made(begin=0.0, at=at, nu=np.zeros((count, 6))), np.tile(waves[:, None], 6)))
+    ((f, p),) = map(points, artists.lines(identify._residuals(found, pairs)[0].axes[0]))
+    assert f[-1] == pytest.approx(2.5), 'the highest that both have'
+    assert f[np.argmax(p)] == pytest.approx(2.0)
+    assert np.all(p[np.abs(f - 2.0) > 0.5] < 1e-3 * p.max())

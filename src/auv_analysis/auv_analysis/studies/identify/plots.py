@@ -52,7 +52,13 @@ def draw(
 
 
 def prediction(rows: Sequence[Mapping[str, Any]]) -> Drawn:
-    """Errors over the horizon."""
+    """Errors over the horizon; none where nothing was held out."""
+    caption = (
+        'Open-loop prediction of what was held out: root mean square of the velocity error, by '
+        'kinetic energy, over how far ahead is predicted.'
+    )
+    if not rows:
+        return None, 'Prediction', f'{caption} There is none.'
     figure = plots.new_figure(2.9)
     axes = figure.subplots()
     for name in dict.fromkeys(row['predictor'] for row in rows):
@@ -63,10 +69,6 @@ def prediction(rows: Sequence[Mapping[str, Any]]) -> Drawn:
     axes.set_xlabel('horizon (s)')
     axes.set_ylabel('velocity error (m/s)')
     axes.legend()
-    caption = (
-        'Open-loop prediction of what was held out: root mean square of the velocity error, by '
-        'kinetic energy, over how far ahead is predicted.'
-    )
     return figure, 'Prediction', caption
 
 
@@ -153,11 +155,13 @@ def _residuals(found: Identified, pairs: Pairs) -> Drawn:
             if period and there.sum() > 16:
                 own = rate / period
                 f, p = welch(e[there, i], own, nperseg=int(there.sum()))
-                spectra.append(p * own / 2)
+                spectra.append((f[1:], p[1:] * own / 2))
         if spectra:
-            shortest = min(map(len, spectra))
-            mean = np.mean([p[:shortest] for p in spectra], axis=0)
-            axes.plot(f[1:shortest], mean[1:], color=COLOURS[0], linewidth=0.9)
+            top = min(float(f[-1]) for f, _ in spectra)  # all have it, whatever their rate
+            f = min((f for f, _ in spectra), key=lambda f: float(f[0]))
+            f = f[f < top * (1 + 1e-9)]
+            mean = np.mean([np.interp(f, *one) for one in spectra], axis=0)
+            axes.plot(f, mean, color=COLOURS[0], linewidth=0.9)
             axes.axhline(1.0, color='black', linewidth=0.6)
             plots.logarithmic(axes, 'x', 'y')
         plots.letter(axes, i, dof)

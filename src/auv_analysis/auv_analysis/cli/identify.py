@@ -77,7 +77,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Recordings, what is free, and what somebody knows."""
     add_results(command)
     add_bags(command)
-    text = 'what is searched beside or in place of the usual: M, M.diagonal, M.pitch.surge, '
+    text = 'what is searched beside the usual: M, M.diagonal, M.pitch.surge, '
     text += 'D_linear, D_linear.full, D_quadratic, restoring, lag, delay, gain, bias, current'
     command.add_argument('--free', action='append', metavar='NAME', help=text)
     text = 'what keeps the value of the vehicle file; may be repeated'
@@ -177,7 +177,11 @@ def _recordings(
             check_rates(record)
         return found
 
-    every = [one for bag in options.bags for one in parts(records(bag), options.part)]
+    bags = {bag.resolve(): bag for bag in options.bags}  # one that is named twice tells no more
+    if Path(options.holdout).resolve() in bags:
+        expected = 'a bag that nothing is learned from'
+        raise InputError('--holdout', '', expected, options.holdout)
+    every = [one for bag in bags.values() for one in parts(records(bag), options.part)]
     other = records(Path(options.holdout)) if Path(options.holdout).exists() else None
     if other is None:
         share = number(at_least=0.0, at_most=0.9, words=' or a bag')

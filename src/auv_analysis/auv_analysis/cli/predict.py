@@ -9,6 +9,8 @@ from typing import Any
 from auv_analysis.cli.arguments import add_results, number
 from auv_analysis.cli.identify import add_bags, read
 
+SETTLED = 5.0  # lags: commands of before count less than a hundredth
+
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Recordings and a vehicle."""
@@ -34,7 +36,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     vehicle, training, held, notes, inputs, out = read(options, 'predict')
     with results_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
         with waiting('predicting'):
-            moments = held_of(held, HISTORY)
+            moments = held_of(held, max(HISTORY, options.delay + SETTLED * options.lag))
             rows = compared(training, moments, vehicle, lag=options.lag, delay=options.delay)
         results = prediction_results(vehicle.name, held, rows, notes)
         results.write(folder.folder)

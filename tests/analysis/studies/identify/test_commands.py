@@ -107,10 +107,12 @@ def test_a_bag_becomes_a_vehicle_file(identified):
 
 
 def test_a_bag_of_its_own_is_held_out(short, bag):
-    given = ['identify', str(short), '--vehicle', 'herman2018', '--holdout', str(bag)]
+    given = ['identify', str(short), str(short), '--vehicle', 'herman2018', '--holdout', str(bag)]
+    with pytest.raises(InputError, match='--holdout: expected a bag that nothing is learned from'):
+        identify_command.read(parser().parse_args([*given[:-1], str(short)]), 'identify')
     trial = identify_command.read(parser().parse_args(given), 'identify')
     assert [round(one.end) for one in (*trial.training, *trial.held)] == [6, 60]
-    assert trial.inputs == [short, bag, shipped('vehicles', 'herman2018')]
+    assert trial.inputs == [short, short, bag, shipped('vehicles', 'herman2018')]
     assert trial.out == Path('runs/identify_herman2018')
 
 
@@ -247,10 +249,16 @@ def test_a_vehicle_that_no_command_takes_gives_no_file(tmp_path):
         (('--holdout', '0.91'), '--holdout: expected a number'),
         (('--part', '100:200'), '--part: expected a time up to'),
         (('--part', '5:2'), 'argument --part'),
+        (('--part', '2:6', '--part', '0:3'), '--part: expected parts that do not overlap'),
         (('--observer', '1'), 'argument --observer: expected'),
         (('--bootstrap', '39'), 'argument --bootstrap: expected'),
         (('--segment', '0'), 'argument --segment: expected'),
         (('--profile', 'mass'), '--profile: expected one of'),
+        (('--profile', 'delay'), 'restoring, lag or a part of it, found delay'),
+        (
+            [f'--fixed={name}' for name in ('M', 'D_linear', 'D_quadratic', 'restoring', 'lag')],
+            '--free: expected a coefficient that is free, beside the delay, found none',
+        ),
         (('--odom', '/odom', '--wrench', '/no'), '/no'),
         (('--odom', '/odom', '--wrench', '/wrench', '--applied'), 'options: wrench_applied'),
     ],
@@ -270,6 +278,16 @@ def test_a_bag_of_less_than_a_second_is_refused(tmp_path, capsys):
     assert 'expected a second and more with attitude, velocity and wrench, found none' in error
 
 
+def test_a_velocity_that_never_changes_is_refused(tmp_path, capsys):
+    _, run = sea_trials.trial(tmp_path, 'herman2018', 5, duration=3.0)
+    seen, frames = motion(run, enu=False), ('odom_ned', 'base_link_fsd')
+    still = seen._replace(twist=np.zeros_like(seen.twist))
+    bag = write(tmp_path / 'bag', simple(still, Maker(), '/odom', '/wrench', frames), Maker())
+    code, error = auv(capsys, 'identify', bag, '--vehicle', 'rexrov', '--out', tmp_path / 'x')
+    assert code == 2
+    assert error.endswith('wrench, found a velocity that never changes\n')
+
+
 def test_rates_that_are_not_those_of_the_attitude_are_refused(tmp_path, capsys):
     given = recording(tmp_path, 3.0, rates=-1.0), '--vehicle', 'herman2018'
     code, error = auv(capsys, 'identify', *given, '--out', tmp_path / 'x')
@@ -283,7 +301,7 @@ def test_a_part_may_have_one_end():
 
 
 def test_what_the_command_line_asks_for_is_what_is_done(short, tmp_path, monkeypatch, capsys):
-    asked, kept = [], []
+    asked, kept, before = [], [], []
 
     def folder(*given, inputs, **options):
         kept.append(inputs)
@@ -296,7 +314,7 @@ def test_what_the_command_line_asks_for_is_what_is_done(short, tmp_path, monkeyp
     monkeypatch.setattr('auv_analysis.output.folder.results_folder', folder)
     monkeypatch.setattr(identify, 'identify', work)
     monkeypatch.setattr(identify, 'compared', work)
-    monkeypatch.setattr(prediction, 'held_of', lambda held, _: held)
+    monkeypatch.setattr(prediction, 'held_of', lambda held, s: before.append(s) or held)
     applied = {'odometry': '/odom', 'wrench': '/wrench'}
     applied['wrench_applied'] = {'topic': '/wrench', 'between': 'hold'}
     (tmp_path / 'map.yaml').write_text(yaml.safe_dump(applied))
@@ -310,6 +328,7 @@ def test_what_the_command_line_asks_for_is_what_is_done(short, tmp_path, monkeyp
     assert auv(capsys, 'identify', *given, *onboard)[0] == 1
     (learnt, held, _, *late), (*_, one, _), (*_, other, _) = asked
     assert late == [0.2, 0.1]
+    assert before == [pytest.approx(0.1 + 5 * 0.2)], 'what still acts of commands of before'
     assert 0.0 < learnt[-1].end <= held[0].start
     assert (one.free[-1], one.fixed, one.profile) == ('lag', ['delay'], ['lag', 'delay'])
     assert (one.segment, one.observer, one.bootstrap) == (2.0, 0.5, 50)

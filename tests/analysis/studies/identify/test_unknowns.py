@@ -7,12 +7,12 @@ from hypothesis import given
 from numpy.testing import assert_allclose
 
 from auv_analysis.studies.identify.record import continuous, rotated, small_rotation
-from auv_analysis.studies.identify.unknowns import DEFAULT, GROUPS, unknowns
+from auv_analysis.studies.identify.unknowns import DEFAULT, unknowns
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.kinematics import quaternion
 from auv_dynamics.vehicle.vehicle_file import load_vehicle, vehicle_from_dict
 
-EVERY = (*GROUPS, 'D_linear.full', 'D_quadratic.full')
+EVERY = (*DEFAULT, 'gain', 'bias', 'current', 'D_linear.full', 'D_quadratic.full')
 
 
 def made(vehicle, free=EVERY, fixed=(), **others):

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -58,7 +59,8 @@ def read_records(
     notes += contradictions(tracks, otherwise, mapping)
     records = of_tracks(bag.name, tracks, role)
     if not any(record.known.any() for record in records):
-        raise InputError(bag, '', 'a second and more with attitude, velocity and wrench', 'none')
+        found = 'a velocity that never changes' if records else 'none'
+        raise InputError(bag, '', 'a second and more with attitude, velocity and wrench', found)
     return records
 
 
@@ -87,6 +89,8 @@ def parts(records: Sequence[Record], spans: Sequence[tuple[float, float]]) -> li
     """The parts of records within spans of time, s; none given: all of them."""
     if not spans:
         return list(records)
+    if any(last[1] > after[0] for last, after in pairwise(sorted(spans))):
+        raise InputError('--part', '', 'parts that do not overlap', str(spans))
     found = long_enough([
         record.part(max(begin, record.start), min(end, record.end))
         for record in records for begin, end in spans

@@ -136,6 +136,8 @@ def identify(
     asked = named([n for n in settings.profile if n != AUTO], u.entries, '--profile', 'options')
     still = _still(training, noise, u)
     every, u = u, u.without([entry.name for entry in still])
+    if not u.entries:
+        raise InputError('--free', '', 'a coefficient that is free, beside the delay', 'none')
     say('least squares')
     theta, late, wrong = least_squares_start(training, u)
     if wrong:
@@ -151,8 +153,9 @@ def identify(
         every = -(-len(segments) // most) if most else 1
         return OutputError(vehicle, segments[::every], step, noise, observer=gain)
 
-    room = step * (max(len(r.command) for r in training) - int(np.ceil(HISTORY / step)))
-    longest = min(sum(r.end - r.start for r in training) / FEWEST, LONG, room)
+    rooms = step * (np.sort([len(r.command) for r in training]) - int(np.ceil(HISTORY / step)))
+    room, half = rooms[-1], np.searchsorted(np.cumsum(rooms), rooms.sum() / 2)
+    longest = min(sum(r.end - r.start for r in training) / FEWEST, LONG, float(rooms[half]))
     if settings.segment:
         problem(settings.segment)  # refused before anything is fitted
     shortest = min(UNMEASURED if np.isnan(noise[:6]).any() else SHORT, longest)
@@ -285,7 +288,7 @@ def _still(records: Sequence[Record], noise: np.ndarray, u: Unknowns) -> list[En
 
     What moves them then is the noise itself, through the controller: fits to that are biased.
     """
-    moved = _rms([nu - nu.mean(axis=0) for nu in map(Record.evenly, records)])
+    moved = _rms([nu - np.nan_to_num(nu).mean(axis=0) for nu in map(Record.evenly, records)])
     known = np.any([record.known for record in records], axis=0)
     still = known & (moved < MOVING * np.nan_to_num(noise[:6]))
     inertial = ('M', 'D_linear', 'D_quadratic')

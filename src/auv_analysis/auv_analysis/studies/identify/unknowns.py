@@ -28,7 +28,6 @@ CORRELATION = 0.5  # of off-diagonal inertia
 DAMPING = 3.0  # times the prior's resistance
 SHORTEST_LAG = 0.02  # s, where the prior has none
 DEFAULT = ('M', 'D_linear', 'D_quadratic', 'restoring', 'lag', 'delay')
-GROUPS = (*DEFAULT, 'gain', 'bias', 'current')
 
 
 @dataclass(frozen=True, eq=False)
@@ -321,7 +320,8 @@ def named(patterns: Sequence[str], every: Sequence[Entry], key: str, origin: obj
     for pattern in patterns:
         some = {entry.name for entry in every if _matches(pattern, entry)}
         if not some:
-            raise InputError(origin, key, one_of(pattern, GROUPS) + ' or a part of it', pattern)
+            groups = dict.fromkeys(entry.name.partition('.')[0] for entry in every)
+            raise InputError(origin, key, one_of(pattern, groups) + ' or a part of it', pattern)
         found |= some
     return found
 

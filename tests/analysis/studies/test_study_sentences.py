@@ -82,7 +82,7 @@ def test_the_verdict_on_a_vehicle_alone() -> None:
     )
     rows[-2] = _predicted('black box', 0.5, *EVEN)
     assert identify.verdict_alone('v', rows).endswith('not clearly better than black box.')
-    assert identify.verdict_alone('v', []) == 'Nothing was held out.'
+    assert identify.verdict_alone('v', []) == 'Nothing was held out, or too little.'
     short = [_predicted('persistence', 0.1, *WORSE), _predicted('black box', 0.2, *EVEN)]
     assert identify.verdict_alone('v', short) == (
         'v predicts worse than persistence at 0.1 s and not clearly better than black box.'
@@ -173,10 +173,10 @@ def test_numbers_for_programs_stand_under_their_names() -> None:
 
 def test_without_anything_held_out_or_with_a_contradiction_there_is_no_model() -> None:
     assert identify.verdict([], []) == (
-        'Nothing was held out: how good the model is has not been tried.'
+        'Nothing was held out, or too little: how good the model is has not been tried.'
     )
     assert identify.verdict([], ['it is wrong', 'twice']) == 'No vehicle file: it is wrong.'
-    assert identify.verdict_alone('rov', []) == 'Nothing was held out.'
+    assert identify.verdict_alone('rov', []) == 'Nothing was held out, or too little.'
 
 
 def test_how_an_identification_was_asked_for() -> None:
@@ -212,12 +212,13 @@ def test_what_residuals_say() -> None:
         ([0.5, 0.5, 0.0], [0, 1], 'only the difference of a and b is known, not all of them '
                                   'together'),
         ([0.5, -0.5, 0.1], [0, 1], 'a may grow if b becomes less'),
+        ([0.5, -0.5, 0.0, -0.4], [0, 1, 3], 'a may grow if b and c become less'),
         ([0.0, 0.0, 1.0], [2], 'the scale of the wrench cannot be told from that of all of M, D '
                                'and g together'),
     ],
 )  # fmt: skip
 def test_directions_that_the_data_leave_open(part: list[float], some: list[int], text: str) -> None:
-    assert _words(['a', 'b', 'gain.surge'], np.array(part), some) == text
+    assert _words(['a', 'b', 'gain.surge', 'c'], np.array(part), some) == text
 
 
 def test_each_coefficient_of_a_vehicle_file_has_its_line() -> None:

@@ -39,6 +39,7 @@ from auv_analysis.studies.identify.record import (
     rotated,
     segments_of,
     small_rotation,
+    smoothed,
 )
 from auv_analysis.studies.identify.residuals import FARTHEST, fill_residuals
 from auv_analysis.studies.identify.start import least_squares_start
@@ -101,10 +102,9 @@ def test_nothing_to_learn_from_is_told():
     spans = (10.0, 11.0), (-5.0, 40.0), (25.0, np.inf)
     found = [parts([record(30.0)], [span]) for span in spans]
     assert_allclose([(one.start, one.end) for (one,) in found], [(10, 11), (0, 30), (25, 30)])
-    found = parts(
-        [record(30.0), shifted(record(20.0), 40.0)], [(41.0, 43.0), (28.0, 45.0), (32.0, 36.0)]
-    )
-    assert_allclose([(one.start, one.end) for one in found], [(28, 30), (41, 43), (40, 45)])
+    spans = [(43.0, 45.0), (28.0, 31.0), (32.0, 36.0), (38.0, 43.0)]
+    found = parts([record(30.0), shifted(record(20.0), 40.0)], spans)
+    assert_allclose([(one.start, one.end) for one in found], [(28, 30), (43, 45), (40, 43)])
 
 
 def test_a_record_begins_where_all_signals_have_and_ends_where_one_does():
@@ -145,6 +145,16 @@ def test_a_velocity_that_was_measured_once_is_that_throughout():
     states = replace(record(3.0), velocity=velocity).states(np.array([0.5, 1.2, 2.5]))
     assert_array_equal(states[:, 8], 0.25)
     assert np.isfinite(states).all()
+
+
+@pytest.mark.parametrize('burst', [1, 3])
+def test_samples_that_come_in_bursts_are_smoothed_over_as_many(burst):
+    """Over 0.4 s: twenty at 50 Hz, of a step in the middle, whatever their stamps."""
+    even = 0.02 * np.arange(300)
+    t = even[::burst].repeat(burst) + np.tile(1e-6 * np.arange(burst), 300 // burst)
+    rows = np.where(even < 3.0, 0.0, 1.0)[:, None]
+    found = smoothed(t, rows, np.array([2.7, 3.3]))[:, 0]
+    assert_allclose(found, [0.0, 1.0], atol=1e-6)
 
 
 def test_between_two_pauses_close_together_there_is_no_record():
@@ -190,6 +200,22 @@ def test_a_segment_fits_into_a_record(herman, monkeypatch):
     some = [herman.part(0.0, 3.0), herman.part(5.0, 13.0)]
     with pytest.raises(InputError, match=r'--segment: expected at most 7\.4 s, found 100 s'):
         identify(some, [], load_vehicle('herman2018'), Settings(segment=100.0))
+
+
+@pytest.mark.parametrize(('short', 'longest'), [(8, 2.4), (4, 6.25)])
+def test_segments_are_no_longer_than_most_of_what_is_recorded(short, longest, herman, monkeypatch):
+    """Stretches of 3 s beside one of 13 s: longer segments would leave all of them out."""
+    asked = []
+
+    def enough(problem, begun, lengths, *_):
+        asked.append(lengths[1])
+        raise StopIteration
+
+    monkeypatch.setattr(identifying, '_search', enough)
+    some = [herman.part(3.0 * k, 3.0 * k + 3.0) for k in range(short)] + [herman.part(25.0, 38.0)]
+    with pytest.raises(StopIteration):
+        identify(some, [], load_vehicle('herman2018'), Settings(('M',)))
+    assert asked == [pytest.approx(longest)]
 
 
 @pytest.mark.parametrize(('unmeasured', 'length'), [(None, 1.25), (2, 5.0)])
@@ -491,6 +517,14 @@ def test_a_stretch_shorter_than_the_horizons_is_left_out(herman):
         assert one['error'] == pytest.approx(other['error'])
 
 
+def test_stretches_that_are_short_are_predicted_as_far_as_they_reach():
+    """Of a minute 12 s would be a fifth, but none of the ten lasts as long."""
+    some = [shifted(record(6.0, 0.05), 10.0 * k) for k in range(10)]
+    held = held_of(some, HISTORY)
+    assert held.horizons.tolist() == [0.1, 0.2, 0.5, 1.0, 2.0]
+    assert held.count == 10 * 14  # from 0.6 s on, every 0.25 s, 2 s before their end
+
+
 def test_an_error_counts_by_its_energy_and_as_a_thousand_at_most():
     errors = np.array([[[1e9, 3.0, np.nan, 0.0, 0.0, -2.0]]])
     found = sizes(Prediction('x', errors), np.diag([4.0, 8.0, 1.0, 1.0, 1.0, 5.0]))
@@ -574,5 +608,10 @@ def test_what_hardly_moves_is_not_searched():
     some.velocity[:, 1] *= 1e-3
     u = unknowns(load_vehicle('herman2018'), ('M', 'D_linear'), speeds=np.ones(6),
                  wrenches=np.ones(6))  # fmt: skip
-    found = _still([some], np.full(9, 0.01), u)
+    noise, lacking = np.full(9, 0.01), record(30.0, seed=1)
+    lacking.velocity[:, 1] = np.nan
+    found = _still([some], noise, u)
     assert [e.name for e in found] == ['M.sway.sway', 'D_linear.sway']
+    some.velocity[:, 1] *= 0.03 / some.evenly()[:, 1].std()  # three times its noise
+    assert not _still([some], noise, u)
+    assert not _still([some, lacking], noise, u), 'what was not measured did not stand still'

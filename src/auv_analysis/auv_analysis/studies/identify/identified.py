@@ -18,6 +18,7 @@ KNOWN = 0.3  # of the prior's deviation: a coefficient is identified where less 
 WIDER = 10.0  # times the prior's deviation: what that changes comes from the prior
 MIXED = 0.5  # a direction in which more is left is one that the data cannot tell
 BAND, NORMAL = (0.025, 0.975), 1.959964  # of 95 %
+FARTHEST = 4.0  # deviations of the prior, of a draw from the fit: farther ones are no vehicles
 NAMED = 0.35  # of a direction's largest part: smaller ones are not named
 
 
@@ -102,7 +103,7 @@ class Identified:
             for value in [float(getattr(self.found, entry.group)[entry.index])]
         ]  # fmt: skip
         if u.is_delay_free:
-            rows.append(self._delay())
+            rows.append(self._delay(all(r['low'] is not None for r in rows if r['name'] == 'lag')))
         for row in rows:
             row.update(self._other_intervals(row))
         return rows
@@ -125,14 +126,15 @@ class Identified:
             )
         return found
 
-    def _delay(self) -> dict[str, Any]:
-        """The delay, found in whole steps; with the lag it is sharper than alone."""
+    def _delay(self, is_known: bool) -> dict[str, Any]:
+        """The delay, found in whole steps; known where the lag is, beside which it is told."""
         value = float(self.fit.unknowns.prior.delay)
         step = self.problem.step
         return {
             'name': 'delay', 'unit': 's', 'prior': 0.0, 'value': value, 'deviation': None,
-            'low': max(value - 2 * step, 0.0), 'high': value + 2 * step, 'left': None,
-            'status': 'identified',
+            'low': max(value - 2 * step, 0.0) if is_known else None,
+            'high': value + 2 * step if is_known else None, 'left': None,
+            'status': 'identified' if is_known else 'prior',
         }  # fmt: skip
 
     def combinations(self) -> list[dict[str, Any]]:
@@ -168,9 +170,10 @@ class Identified:
         """Models (count,) drawn from the uncertainty."""
         rng = np.random.default_rng(seed)
         scale = self.fit.quantile / NORMAL  # few segments: as wide as the intervals
-        root = np.linalg.cholesky(self.covariance + 1e-14 * np.eye(len(self.covariance)))
-        theta = self.fit.theta + scale * rng.standard_normal((count, len(root))) @ root.T
-        return self.fit.unknowns.coefficients(theta)
+        least = 1e-14 * np.trace(self.covariance)  # above rounding, which is of the largest
+        root = np.linalg.cholesky(self.covariance + least * np.eye(len(self.covariance)))
+        moves = scale * rng.standard_normal((count, len(root))) @ root.T
+        return self.fit.unknowns.coefficients(self.fit.theta + np.clip(moves, -FARTHEST, FARTHEST))
 
 
 def _words(names: Sequence[str], part: np.ndarray, some: Sequence[int]) -> str:
@@ -184,4 +187,5 @@ def _words(names: Sequence[str], part: np.ndarray, some: Sequence[int]) -> str:
         return f'nothing is known of {names[some[0]]}'
     if not against:
         return f'only the difference of {join(up)} is known, not all of them together'
-    return f'{join(up)} may grow if {join(against)} becomes less'
+    verb = 'becomes' if len(against) == 1 else 'become'
+    return f'{join(up)} may grow if {join(against)} {verb} less'

@@ -74,10 +74,15 @@ class Held:
 def held_of(records: Sequence[Record], history: float) -> Held:
     """Moments of recordings, and horizons.
 
-    A horizon longer than a fifth of all that is held out is left out.
+    A horizon longer than a fifth of all that is held out is left out, and one of which moments in
+    less than a fifth of it are followed by as much of their recording.
     """
-    total = sum(record.end - record.start for record in records)
-    horizons = np.array([h for h in HORIZONS if h <= max(total / 5, HORIZONS[0])])
+    lengths = np.array([record.end - record.start for record in records])
+    total = float(lengths.sum())
+    horizons = np.array(
+        [h for h in HORIZONS
+         if h <= total / 5 <= np.maximum(lengths - history - h, 0.0).sum()] or HORIZONS[:1]
+    )  # fmt: skip
     reach = float(horizons[-1])
     spacing = max(APART, total / MOST)
     found, measured, blocks, offset = [], [], [], 0

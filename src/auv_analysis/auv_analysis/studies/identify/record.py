@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.bag.tracks import Track, between_gaps, integral
+from auv_analysis.bag.tracks import BURST, Track, between_gaps, integral
 from auv_analysis.metrics.local_polynomials import ORDER, SMALLEST, variance, weights, windows
 from auv_dynamics.kernel.compile import plain
 from auv_dynamics.ros.interface import NANOSECONDS, WRENCH
@@ -75,8 +75,8 @@ class Record:
         return np.concatenate([q / np.linalg.norm(q, axis=1, keepdims=True), nu], axis=1)
 
     def evenly(self) -> np.ndarray:
-        """Velocity (k, 6) at even times; zero where it is not measured."""
-        return np.nan_to_num(self.states(np.arange(self.start, self.end, 0.1))[:, 4:])
+        """Velocity (k, 6) at even times; NaN: not measured."""
+        return self.states(np.arange(self.start, self.end, 0.1))[:, 4:]
 
     def noise(self) -> np.ndarray:
         """(9,) standard deviation of white noise: velocity, then attitude in rad; NaN: unknown."""
@@ -140,11 +140,18 @@ def continuous(q: np.ndarray) -> np.ndarray:
     return q * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
 
 
+def usual_interval(t: np.ndarray) -> float:
+    """Median interval of rising times (n,), the mean one of those that come in bursts; s."""
+    apart = np.diff(t)
+    median, mean = float(np.median(apart)), float(apart.mean())
+    return mean if median < BURST * mean else median
+
+
 def smoothed(t: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Values (m, k) of local polynomials through (n, k) at rising times, at other times."""
     if len(t) < SMALLEST:
         return np.stack([np.interp(at, t, column) for column in rows.T], axis=1)
-    count = int(np.clip(SMOOTHING / max(np.median(np.diff(t)), 1e-9), SMALLEST, len(t)))
+    count = int(np.clip(SMOOTHING / usual_interval(t), SMALLEST, len(t)))
     found = np.empty((len(at), rows.shape[1]))
     for here, near in windows(t, at, count):
         (w,) = weights(t, at[here], near, ORDER, rate=False)

@@ -242,7 +242,7 @@ def verdict_alone(vehicle: str, rows: Sequence[Mapping[str, Any]]) -> str:
             said.append(f'worse than {name} at {at} s')
         else:
             said.append(f'not clearly better than {name}')
-    return f'{vehicle} predicts {join(said)}.' if rows else 'Nothing was held out.'
+    return f'{vehicle} predicts {join(said)}.' if rows else 'Nothing was held out, or too little.'
 
 
 def verdict(rows: Sequence[Mapping[str, Any]], contradicted: Sequence[str]) -> str:
@@ -250,7 +250,7 @@ def verdict(rows: Sequence[Mapping[str, Any]], contradicted: Sequence[str]) -> s
     if contradicted:
         return f'No vehicle file: {contradicted[0]}.'
     if not rows:
-        return 'Nothing was held out: how good the model is has not been tried.'
+        return 'Nothing was held out, or too little: how good the model is has not been tried.'
     first = [row for row in by_name(rows, 'prior') if row['horizon'] >= JUDGED] or by_name(
         rows, 'prior'
     )

@@ -23,6 +23,7 @@ CLEARLY = 10.0  # times nearer to the prior
 TRIM = 1e-3  # of the weight: what W - B and W r_G - B r_B are not known better than, N, N m
 ASYMMETRIC = 0.02  # of the diagonal: what a mirror would change
 ALONE = 0.9  # of the power of the command within one line of its spectrum
+PERIODS = 4  # of the strongest frequency: in fewer, others are hardly lines apart
 CLEARLY_OFF = 0.6  # of the angular velocity: more than a delay would explain
 
 
@@ -60,10 +61,10 @@ def excitation(records: Sequence[Record]) -> list[str]:
 
 
 def _in_one_line(signal: np.ndarray) -> float:
-    """Share of the power of (n, 6) that lies around the strongest frequency."""
+    """Share of the power of (n, 6) around the strongest frequency; 0 of too few periods of it."""
     total = (np.abs(np.fft.rfft(signal - signal.mean(axis=0), axis=0)) ** 2).sum(axis=1)
     peak = int(np.argmax(total))
-    return float(total[max(peak - 2, 0) : peak + 3].sum() / max(total.sum(), 1e-30))
+    return float(total[peak - 2 : peak + 3].sum() / total.sum()) if peak >= PERIODS else 0.0
 
 
 def contradictions(found: Identified) -> list[str]:

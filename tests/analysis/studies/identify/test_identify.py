@@ -104,6 +104,19 @@ def test_models_are_drawn_also_where_nearly_all_doubt_is_in_one_direction(found)
     assert_allclose(moves, 8.0, rtol=1e-6)
 
 
+def test_what_is_unknown_by_itself_is_no_combination(found):
+    """Of coefficients that are as unknown, every mixture is as unknown as well."""
+    names = found.fit.unknowns.names
+    apart = 1e-6 * np.random.default_rng(0).normal(size=(len(names),) * 2)
+    apart[0, 1] = -25.0  # and once more below: of variances of 100, by a prior ten times as wide
+    fit = replace(found.fit, information=np.zeros_like(found.fit.information))
+    every = replace(found, fit=fit, covariance=np.eye(len(names)) + apart + apart.T).combinations()
+    both = [one['words'] for one in every if set(one['names']) == set(names[:2])]
+    assert ['becomes less' in words for words in both] == [True, False]
+    words = {one['words'] for one in every} - set(both)
+    assert words == {f'nothing is known of {name}' for name in names[2:]}
+
+
 @pytest.mark.parametrize(
     ('wrong', 'said'),
     [

@@ -16,6 +16,7 @@ from auv_dynamics.vehicle.vehicle import Vehicle
 
 KNOWN = 0.3  # of the prior's deviation: a coefficient is identified where less is left of it
 WIDER = 10.0  # times the prior's deviation: what that changes comes from the prior
+ALONE = 0.05  # of its variance: covariances with all others together that are none
 MIXED = 0.5  # a direction in which more is left is one that the data cannot tell
 BAND, NORMAL = (0.025, 0.975), 1.959964  # of 95 %
 FARTHEST = 4.0  # deviations of the prior, of a draw from the fit: farther ones are no vehicles
@@ -161,10 +162,19 @@ class Identified:
         return self.covariance + np.linalg.inv(S + P / WIDER**2) - np.linalg.inv(S + P)
 
     def _directions(self) -> tuple[np.ndarray, np.ndarray]:
-        """Variances (n,) in those of the prior, and orthogonal directions (n, n) of theta."""
+        """Variances (n,) in those of the prior, and orthogonal directions (n, n) of theta.
+
+        What hangs together with nothing is a direction of its own: of several that are as unknown,
+        any mixture would be one as well.
+        """
         P, _ = self.fit.unknowns.precision(self.fit.theta)
         root = np.linalg.cholesky(P)
-        return np.linalg.eigh(root.T @ self._by_data() @ root)
+        C = root.T @ self._by_data() @ root
+        own = np.diag(C).copy()
+        mixed = np.linalg.norm(C - np.diag(own), axis=0) > ALONE * own
+        vectors = np.eye(len(C))
+        own[mixed], vectors[np.ix_(mixed, mixed)] = np.linalg.eigh(C[np.ix_(mixed, mixed)])
+        return own, vectors
 
     def draws(self, count: int, seed: int = 0) -> Coefficients:
         """Models (count,) drawn from the uncertainty."""

@@ -43,7 +43,10 @@ def test_results_are_proposed_to_be_looked_at_the_newest_first(folder, capsys):
             bag.parent / 'summary.json',
         ):
             file.touch()
-    os.utime(folder / 'runs' / 'first', (1, 1))
+    (folder / 'runs' / 'analyze_first').mkdir()  # a summary of other runs, none of its own
+    (folder / 'runs' / 'analyze_first' / 'summary.json').touch()
+    for age, name in enumerate(('analyze_first', 'first'), start=1):
+        os.utime(folder / 'runs' / name, (9 - age, 9 - age))
     text = _said(capsys)
     assert text.startswith('What could come next:')
     assert 'auv new vehicle NAME' in text, 'as there is no file'
@@ -73,6 +76,11 @@ def test_files_at_hand_are_proposed_by_what_they_are(text, line, folder, capsys)
     assert line in said
     assert ('mine.yaml' in said) != ('auv new vehicle NAME' in said)
     assert 'notes.txt' not in said
+
+
+def test_what_is_proposed_can_be_typed(folder, capsys):
+    (folder / 'my dive.yaml').write_text('controllers: {}\n')
+    assert "auv simulate 'my dive.yaml'" in _said(capsys)
 
 
 def test_of_many_files_a_few_are_proposed(folder, capsys):

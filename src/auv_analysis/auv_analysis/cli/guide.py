@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
+from shlex import quote
 from typing import NamedTuple
 
 from auv_dynamics.files.errors import printable
@@ -83,15 +84,21 @@ def _of_results(results: list[Path]) -> Iterator[Step]:
         return
     newest = results[0]
     if (newest / 'report.html').is_file():
-        yield Step(f'xdg-open {newest / "report.html"}', 'the newest report')
+        yield Step(f'xdg-open {quote(str(newest / "report.html"))}', 'the newest report')
     if (newest / 'sweep.json').is_file():
-        yield Step(f'auv analyze {newest}', 'what the sweep says')
+        yield Step(f'auv analyze {quote(str(newest))}', 'what the sweep says')
     bag = next((path.parent for path in newest.glob('*/metadata.yaml')), None)
     if bag is not None:
-        yield Step(f'auv replay {bag}', 'the recorded run again, as live topics')
-    compared = [path for path in results if (path / 'summary.json').is_file()][:2]
+        yield Step(f'auv replay {quote(str(bag))}', 'the recorded run again, as live topics')
+    compared = [quote(str(path)) for path in results if _has_runs(path)][:2]
     if len(compared) == 2:
         yield Step(f'auv analyze {compared[1]} {compared[0]}', 'the two newest, side by side')
+
+
+def _has_runs(folder: Path) -> bool:
+    """Whether results have runs that can be analysed again: samples or bags."""
+    parts = ('*.npz', '*/metadata.yaml')
+    return (folder / 'summary.json').is_file() and any(any(folder.glob(part)) for part in parts)
 
 
 def _of_files(files: list[tuple[str, Path]]) -> Iterator[Step]:
@@ -101,4 +108,4 @@ def _of_files(files: list[tuple[str, Path]]) -> Iterator[Step]:
         'campaign': Step('auv sweep {}', 'your campaign'),
     }
     for kind, path in files[:SHOWN]:
-        yield Step(*(text.format(path.name) for text in lines[kind]))
+        yield Step(*(text.format(quote(path.name)) for text in lines[kind]))

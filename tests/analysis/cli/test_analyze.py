@@ -67,7 +67,7 @@ def test_results_are_named_after_the_scenarios(scenarios, folder, tmp_path, monk
 
 
 def test_three_runs_are_shown_one_by_one_and_more_side_by_side(tmp_path, monkeypatch) -> None:
-    read = SimpleNamespace(files=[tmp_path / 'read.bin'])
+    read = SimpleNamespace(files=[tmp_path / 'read.bin'], kind='bag')
     monkeypatch.setattr(sources, 'sources_of', lambda results, *_: [read] * len(results))
     for name in ('_few', '_many'):
         monkeypatch.setattr(analyze, name, lambda *_, name=name: name)
@@ -76,6 +76,13 @@ def test_three_runs_are_shown_one_by_one_and_more_side_by_side(tmp_path, monkeyp
     assert found == ['_few', '_many']
     with pytest.raises(InputError, match=r'^--law: expected .*nearest: gvc'):
         analyze.run(grammar.parse_args(['analyze', 'a', '--law', 'gvcc']))
+    told = ['--odom', '/o', '--frames', 'ned_fsd']
+    with pytest.raises(InputError, match=r'^--namespace: expected a bag of our nodes, found a map'):
+        analyze.run(grammar.parse_args(['analyze', 'a', *told, '--namespace', '/auv1']))
+    read.kind = 'samples'
+    for option in (['--vehicle', 'rexrov'], ['--namespace', '/auv1'], told):
+        with pytest.raises(InputError, match=f'^{option[0]}: expected a bag, found a$'):
+            analyze.run(grammar.parse_args(['analyze', 'a', *option]))
     read.files[0].touch()  # a folder that is in use is refused before anything is read
     with pytest.raises(InputError, match='--overwrite'):
         analyze.run(grammar.parse_args(['analyze', 'a', '--out', str(tmp_path)]))

@@ -25,10 +25,11 @@ if TYPE_CHECKING:
 
 FEW = 3  # runs up to which the report shows every figure of each
 LONGEST = 80  # of a folder's name
-OF_RUNS = (
-    'no_report', 'vehicle', 'namespace', 'law', 'map', 'odometry', 'wrench', 'setpoint', 'frames',
-    'twist_frame', 'step', 'gap',
+OF_BAGS = (
+    'vehicle', 'namespace', 'map', 'odometry', 'wrench', 'setpoint', 'frames', 'twist_frame',
+    'step', 'gap',
 )  # fmt: skip
+OF_RUNS = ('no_report', 'law', *OF_BAGS)
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -70,7 +71,11 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     for law in options.law or ():
         import_law(law)
     mapping = topic_map(options, options.vehicle)
+    if mapping is not None:
+        refuse_given(options, ('namespace',), 'a bag of our nodes', 'a mapping of topics')
     sources = sources_of(options.results, mapping, options.namespace)
+    if all(source.kind != 'bag' for source in sources):
+        refuse_given(options, OF_BAGS, 'a bag', options.results[0])
     if options.out:
         check_free(options.out, overwrite=options.overwrite, inputs=_inputs(sources, options))
     return _few(sources, options) if len(sources) <= FEW else _many(sources, options)

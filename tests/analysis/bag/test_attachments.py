@@ -11,7 +11,7 @@ from auv_analysis import load_scenario
 from auv_analysis.bag import attachments
 from auv_analysis.bag.reading import BagContents
 from auv_analysis.scenario.fault_words import marks_of
-from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.errors import MARK, InputError
 
 BAG = Path('dives/harbour/bag')
 GAINS = {f'gains.{name}': [value] for name, value in
@@ -107,6 +107,7 @@ def test_kinds_of_disturbances_are_known_where_a_scenario_is() -> None:
 
 def test_a_scenario_has_its_own_name_else_that_of_the_folder_around() -> None:
     assert attachments.scenario_name(BagContents(), BAG) == 'harbour'
+    assert attachments.scenario_name(BagContents(), Path('/$a$\udcff/bag')) == f'_a_{MARK}'
     for name in ('case1', 'a.b_c-d+1', 'x' * 100):
         assert attachments.scenario_name(contents(scenario={'name': name}), BAG) == name
     for name in ('_x', 'x' * 101, 'a b', None, 7):

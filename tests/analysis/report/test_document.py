@@ -78,6 +78,10 @@ def made(tmp_path: Path, **changes) -> str:
     return (tmp_path / 'report.html').read_text(encoding='utf-8')
 
 
+def test_a_name_that_is_no_utf_8_does_not_lose_a_report(tmp_path):
+    assert '<h1>a?b</h1>' in made(tmp_path, title='a\udcffb')
+
+
 def test_a_document_of_all_kinds_of_blocks(tmp_path, approved):
     text = made(tmp_path)
     approved.folder(tmp_path)

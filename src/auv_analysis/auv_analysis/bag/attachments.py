@@ -6,7 +6,7 @@ from typing import Any
 
 from auv_analysis.bag.reading import BagContents
 from auv_analysis.scenario.fault_words import Mark, marks_of
-from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.errors import InputError, printable
 from auv_dynamics.files.yaml_files import check, parse_yaml
 from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.vehicle.vehicle import Vehicle
@@ -123,7 +123,7 @@ def scenario_name(contents: BagContents, bag: Path) -> str:
     """Name of the scenario; without its file, that of the folder around the bag."""
     text, file = contents.attachments.get('scenario.yaml'), f'{bag}: scenario.yaml'
     if text is None:
-        return bag.resolve().parent.name
+        return printable(bag.resolve().parent.name).replace('$', '_')
     name = parse_yaml(text, file, 'scenario').get('name')
     if not (isinstance(name, str) and NAME.fullmatch(name)):
         raise InputError(file, 'name', 'a word without blanks or slashes', name)

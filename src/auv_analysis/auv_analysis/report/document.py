@@ -157,7 +157,7 @@ def write_document(
         )
     )
     path = out / 'report.html'
-    path.write_text(text + '\n', encoding='utf-8')
+    path.write_text(text + '\n', encoding='utf-8', errors='replace')  # a name of a file may be none
     write_numbers(out / NUMBERS, [table for section in sections for table in section.tables])
     return path
 

@@ -319,6 +319,7 @@ def test_sentences_count_what_settles_differs_and_fails() -> None:
         'Durations differ: 3 s (2 runs) and 5 s (1 runs); steps differ: 0.1 s (2 runs) and '
         '0.2 s (1 runs); means and root mean squares are those of each whole run.'
     )
+    assert len(said(a | {'duration': 0.3}, a | {'duration': 3 * 0.1})) == 1, 'that is rounding'
     for many, end in ((6, '5 s (1 runs) and 6 s (1 runs); '), (7, '6 s (1 runs) and others; ')):
         text = said(*(a | {'duration': i + 1.0} for i in range(many)))[1]
         assert f'{end}means and root mean squares' in text

@@ -21,6 +21,7 @@ from auv_analysis.studies.compare.sources import (
     sources_of,
 )
 from auv_dynamics import InputError
+from auv_dynamics.files.errors import MARK
 
 ROOT = Path(__file__).parents[4]
 SHORT = (ROOT / 'config/scenarios/case1.yaml').read_text().replace('30.0', '0.3')
@@ -244,6 +245,8 @@ def test_runs_of_one_name_are_told_apart_by_their_folders() -> None:
     assert found == ['a/gvc', 'b/gvc', 'x/cl']
     found = _names(('/1/a/gvc', 'x', 'gvc'), ('/2/a/gvc', 'x', 'gvc'))
     assert found == ['1/a/gvc', '2/a/gvc']
+    hostile = _names(('/$\\frac$\udcff/gvc', 'x', 'gvc'), ('/b/gvc', 'x', 'gvc'))
+    assert hostile == [f'_\\frac_{MARK}/gvc', 'b/gvc']
     deep = [('/1/b/c/d/gvc', 'x', 'gvc'), ('/2/b/c/d/gvc', 'x', 'gvc')]
     assert _names(*deep) == ['1/b/c/d/gvc', '2/b/c/d/gvc']
     assert _names(*((path.replace('b', 'a/b'), *rest) for path, *rest in deep)) == [

@@ -29,7 +29,7 @@ from auv_analysis.studies.compare.ranking import (
     write_table,
 )
 from auv_analysis.studies.compare.sources import RunSource, named, open_source
-from auv_dynamics.files.errors import FailedError, first_line
+from auv_dynamics.files.errors import FailedError, first_line, printable
 from auv_dynamics.vehicle import DOFS
 
 SECTIONS = {  # section -> its title, and the plots in it
@@ -80,7 +80,7 @@ def entries_of(sources: Sequence[RunSource], vehicle: str | None = None) -> list
 
 def _entry(source: RunSource, vehicle: str | None) -> Entry:
     """Entry without a name."""
-    origin = 'simulated now' if source.kind == 'scenario' else str(source.path)
+    origin = 'simulated now' if source.kind == 'scenario' else printable(str(source.path))
     try:
         run = open_source(source, vehicle).run
     except ArithmeticError as error:  # it diverges, or a user's own law fails
@@ -222,9 +222,9 @@ def _differing(rows: Rows) -> str:
     """Durations and steps where they are not all the same, and what that means."""
     parts = []
     for name in ('duration', 'step'):
-        counts = Counter(row[name] for row in rows)
+        counts = Counter(f'{row[name]:g} s' for row in rows)  # 0.3 and 3 * 0.1 are the same
         if len(counts) > 1:
-            listed = [f'{value:g} s ({count} runs)' for value, count in counts.most_common()]
+            listed = [f'{text} ({count} runs)' for text, count in counts.most_common()]
             parts.append(f'{name}s differ: {_first(listed)}')
     if not parts:
         return ''

@@ -16,7 +16,7 @@ from auv_analysis.runs.run import Hold, Run
 from auv_analysis.runs.samples import ENDING, load_samples
 from auv_analysis.scenario.scenario import Scenario, load_scenario
 from auv_analysis.simulation.simulate import announce, simulate
-from auv_dynamics.files.errors import InputError, reason
+from auv_dynamics.files.errors import InputError, printable, reason
 from auv_dynamics.files.shipped import shipped_by_name
 from auv_dynamics.files.yaml_files import read_yaml
 from auv_dynamics.ros.interface import ODOM
@@ -318,7 +318,8 @@ def _folders(source: RunSource, depth: int) -> tuple[str, ...]:
     """Last folders of the path that a run was read from, without the part that names the run."""
     if source.kind == 'scenario':
         return ('simulated', source.path.stem)
-    return Path(source.path).resolve().parent.parts[1:][-depth:]
+    parts = Path(source.path).resolve().parent.parts[1:][-depth:]
+    return tuple(printable(part).replace('$', '_') for part in parts)  # figures set formulas by $
 
 
 def numbered(names: Sequence[str]) -> list[str]:

@@ -131,18 +131,21 @@ def test_it_falls_below_one_where_the_run_settles(entries) -> None:
         assert first == pytest.approx(settled, abs=0.05)
 
 
-def test_what_is_still_to_come_is_the_largest_of_all_later_errors() -> None:
+@pytest.mark.parametrize('unknown', [[], [1, 4]])
+def test_what_is_still_to_come_is_the_largest_of_all_later_errors(unknown: list[int]) -> None:
     rng = np.random.default_rng(3)
     lines = [(np.sort(rng.choice(50, 7, replace=False)) * 1.0, rng.normal(size=7))
              for _ in range(6)]  # fmt: skip
     peak = np.arange(1.0, 7.0)
+    for i in unknown:
+        lines[i], peak[i] = (lines[i][0], np.full(7, np.nan)), np.nan
     run = Made(line=lambda signal, i, part: lines[i], part=lambda signal: Made(peak=peak))
     t, ratio = plots.still_to_come(run)
     assert list(t) == sorted({time for times, _ in lines for time in times})
     for now, found in zip(t, ratio, strict=True):
         later = [np.abs(error[times >= now]) / width
                  for (times, error), width in zip(lines, band_of(peak), strict=True)]  # fmt: skip
-        assert found == max(np.concatenate(later))
+        assert found == np.nanmax([0.0, *np.concatenate(later)])
 
 
 def test_a_failure_is_a_text_in_a_table_without_any(entries) -> None:

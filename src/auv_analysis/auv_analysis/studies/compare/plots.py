@@ -169,7 +169,8 @@ def still_to_come(run: RunDigest) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     t : (n,) s
-    ratio : (n,) the largest of the six degrees of freedom; below 1 from where all have settled
+    ratio : (n,) the largest of the degrees of freedom that are known; below 1 from where all of
+        them have settled
 
     """
     lines = [run.line('error', i, 'log') for i in range(6)]
@@ -179,7 +180,7 @@ def still_to_come(run: RunDigest) -> tuple[np.ndarray, np.ndarray]:
     for (times, error), width in zip(lines, band, strict=True):
         rest = np.maximum.accumulate(np.abs(error)[::-1])[::-1] / width
         behind = np.searchsorted(times, t)  # the first sample at or after t has what is to come
-        ratio = np.maximum(ratio, np.append(rest, 0.0)[behind])
+        ratio = np.fmax(ratio, np.append(rest, 0.0)[behind])
     return t, ratio
 
 
@@ -189,8 +190,8 @@ def errors(entries: Sequence[Entry]) -> Drawn:
     labels = list(dict.fromkeys(label for group in groups.values() for label in group))
     title = 'Error still to come, in multiples of its band'
     caption = (
-        f'{title}: the largest velocity error between t and the end of the run, of all six '
-        'degrees of freedom, divided by the band in which it counts as settled '
+        f'{title}: the largest velocity error between t and the end of the run, of all degrees of '
+        'freedom in which it is known, divided by the band in which it counts as settled '
         f'({BAND_TEXT}). '
     )
     if not groups:

@@ -231,7 +231,7 @@ def judge_runs(
     -------
     claims : 21 rows where all runs are of case1 or all of case2, else none; none either where
         all of them have what the paper's have not, such as limits of actuators, or one has another
-        inertia, set-point or disturbance than the scenario whose name it bears
+        inertia, start, set-point or disturbance than the scenario whose name it bears
 
     """
     scenarios = {run.scenario for run in runs.values()}
@@ -250,15 +250,20 @@ def judge_runs(
 
 
 def _is_case(run: RunDigest, case: Scenario) -> bool:
-    """Whether a run has the inertia, the set-point and the disturbance of the case it is named."""
+    """Whether a run has the inertia, start, set-point and disturbance of the case it is named."""
     t = run.course['t']
     wanted = {'nu_d': case.setpoint.value(t)}
     if run.knows_disturbance:
         wanted['F'] = make_disturbance(case.data['disturbance'])(t)
-    return np.allclose(run.vehicle.M, case.vehicle.M) and all(
-        name in run.course
-        and np.allclose(run.course[name], values, 0.0, SAME * np.abs(values).max(axis=0) + TINY)
-        for name, values in wanted.items()
+    begun = np.allclose(run.begin, np.concatenate(case.initial), 0.0, TINY)
+    return (
+        begun
+        and np.allclose(run.vehicle.M, case.vehicle.M)
+        and all(
+            name in run.course
+            and np.allclose(run.course[name], values, 0.0, SAME * np.abs(values).max(axis=0) + TINY)
+            for name, values in wanted.items()
+        )
     )
 
 

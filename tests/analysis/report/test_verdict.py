@@ -181,6 +181,8 @@ def longer(run: RunDigest, times: float) -> Extent:
     ('word', 'change'),
     [
         ('vehicle', lambda run: {'vehicle': run.vehicle.changed(M=1.1 * run.vehicle.M)}),
+        ('vehicle', lambda run: {'vehicle': run.vehicle.changed(lift=np.eye(6))}),
+        ('vehicle', lambda run: {'vehicle': run.vehicle.changed(weight=0.9 * run.vehicle.weight)}),
         ('length', lambda run: {'known_extent': longer(run, 1.02)}),
         ('start', lambda run: {'begin': run.begin + 0.006 * (np.arange(12) == 3)}),
         ('disturbance', lambda run: {'course': run.course | {'F': run.course['F'] + 1.0}}),

@@ -134,6 +134,12 @@ def alike(runs: Sequence[RunDigest], signal: str) -> bool | None:
     return True
 
 
+def same_vehicle(runs: Sequence[RunInfo]) -> bool:
+    """Whether runs, one at least, have the same M, D and g, as their controllers know them."""
+    first, *others = ([np.asarray(part) for part in run.vehicle.model] for run in runs)
+    return all(np.array_equal(a, b) for one in others for a, b in zip(first, one, strict=True))
+
+
 def cut_before(run: RunInfo, time: float) -> float:
     """Cut before the sample nearest to a time, s from the start."""
     return run.start + time - 0.5 * run.step

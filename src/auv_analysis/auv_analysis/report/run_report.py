@@ -14,7 +14,15 @@ from auv_analysis.metrics.summary import band_of
 from auv_analysis.output.parallel import meanwhile
 from auv_analysis.output.text import fixed, join, largest, number, plain, residuals
 from auv_analysis.report import run_tables as tables
-from auv_analysis.report.digest import ESTIMATES, TINY, RunDigest, alike, digests, last_third
+from auv_analysis.report.digest import (
+    ESTIMATES,
+    TINY,
+    RunDigest,
+    alike,
+    digests,
+    last_third,
+    same_vehicle,
+)
 from auv_analysis.report.document import Block, Gallery, Section, Sentence, prose, write_document
 from auv_analysis.report.panels import PanelSet, interactive
 from auv_analysis.report.plots import GROUPS, FigureRecord
@@ -192,9 +200,7 @@ class SectionInputs:
         """Whether the scenarios describe the same disturbances and faults of the same vehicle."""
         wanted = [(s.data.get('disturbance'), s.data.get('faults')) for s in self.scenes.values()]
         known = all(scene.data for scene in self.scenes.values())
-        M = runs[0].vehicle.M
-        same = all(np.array_equal(run.vehicle.M, M) for run in runs)
-        return known and same and all(one == wanted[0] for one in wanted)
+        return known and same_vehicle(runs) and all(one == wanted[0] for one in wanted)
 
     def _gains(self) -> Iterator[Block]:
         laws = {run.law for run in self.runs.values()}

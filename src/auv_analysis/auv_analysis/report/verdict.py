@@ -8,7 +8,7 @@ import numpy as np
 from auv_analysis.metrics.lyapunov import OF_THE_MOTION
 from auv_analysis.metrics.summary import SMALLEST_BAND
 from auv_analysis.output.text import Maths, join, number
-from auv_analysis.report.digest import RunDigest, alike
+from auv_analysis.report.digest import RunDigest, alike, same_vehicle
 from auv_dynamics.files.shipped import shipped_names
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.law import SHIPPED
@@ -77,10 +77,10 @@ def _errors(summary: Summary) -> np.ndarray | None:
 def _differing(runs: Sequence[RunDigest]) -> list[str]:
     """What the runs would need in common and do not have; where they start counts for nothing."""
     first, *others = runs
-    M, begin, length = first.vehicle.M, first.begin, first.duration
+    begin, length = first.begin, first.duration
     depends = any(kind in OF_THE_MOTION for run in runs for kind in run.kinds or ())
     same = {
-        'vehicle': all(np.array_equal(run.vehicle.M, M) for run in others),
+        'vehicle': same_vehicle(runs),
         'length': all(abs(run.duration - length) <= EQUAL * length for run in others),
         'start': not any(np.any(np.abs(run.begin - begin)[3:] > SMALLEST_BAND) for run in others),
         'set-point': alike(runs, 'nu_d'),

@@ -116,6 +116,9 @@ def test_set_up_says_every_number_of_the_scenario(rough):
         'limit: [3000, 3000, 4000, 800, 800, 500], rate: 20000, lag: 0.05, delay: 0.02'
     ]
     assert words['anti-windup'] == ['on for gvc and pid; off for wound']
+    renamed = [{f'x_{name}': entry for name, entry in one.items()} for one in rough[:2]]
+    told = _words(*renamed, rough[2])['anti-windup']
+    assert told == ['on for x_gvc and x_pid; off for x_wound'], 'as runs of two folders are'
     assert words['sensors'] == ['velocity_noise: 0.002, attitude_noise: 0.001, drop_out: 0.1']
     assert words['seed'] == ['3']
     assert any('symmetrised' in line for line in words['warnings'])

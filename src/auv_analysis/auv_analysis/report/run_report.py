@@ -78,9 +78,10 @@ def write_report(
     """
     if not runs:
         raise ValueError('runs: expected at least one run, found none')
-    shown = {name: replace(run, controller=name) for name, run in digests(runs).items()}
+    given = digests(runs)
+    shown = {name: replace(run, controller=name) for name, run in given.items()}
     scenes = {
-        names: set_up({name: shown[name] for name in names}, summaries, text)
+        names: set_up({name: given[name] for name in names}, summaries, text)
         for names, text in _shared_by(shown, scenario_text)
     }
     limits = {name: scene.limit for names, scene in scenes.items() for name in names}

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.metrics.quantities import VELOCITY, WRENCH
 from auv_analysis.output.text import join, plain
 from auv_analysis.runs.run import FOREIGN, RunInfo
 from auv_analysis.scenario.fault_words import Mark, marks_of
@@ -19,7 +20,6 @@ from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.control.gains import sampling_warning, state_warning
 from auv_gvc_controller.laws.law import make_gains
 
-VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
 IDEAL = 'ideal: the commanded wrench is the applied one'
 PERFECT = 'perfect: the law sees the true state'
 FOLDERS = re.compile(r'^.*?(?=[^/\s]+\.ya?ml: )')  # before a file's name: a report is passed on
@@ -50,7 +50,7 @@ def set_up(runs: Mapping[str, RunInfo], summaries: Mapping[str, Any], scenario_t
 
     Parameters
     ----------
-    runs, summaries : by name
+    runs, summaries : by name, which may be another than that of the controller
     scenario_text : the scenario's file; a text that is none, or that of other runs, says nothing
 
     """
@@ -159,7 +159,8 @@ def _but(marks: Sequence[Mark], kinds: Sequence[str]) -> str:
 
 
 def _anti_windup(controllers: Mapping[str, Any], runs: Mapping[str, RunInfo]) -> str:
-    off = [name for name in runs if not controllers.get(name, {}).get('anti_windup', True)]
+    own = {name: controllers.get(run.controller, {}) for name, run in runs.items()}
+    off = [name for name, entry in own.items() if not entry.get('anti_windup', True)]
     on = [name for name in runs if name not in off]
     parts = [f'on for {join(on)}'] if on else []
     return '; '.join(parts + ([f'off for {join(off)}'] if off else []))

@@ -11,8 +11,7 @@ from xml.etree import ElementTree
 import pytest
 from sensor_msgs.msg import JointState
 
-from auv_analysis.report.plots import COLOURS, GREY
-from auv_analysis.report.run_plots import RUNS
+from auv_analysis.report.plots import COLOURS, GREY, RUNS
 from auv_dynamics.ros import topics
 from auv_dynamics.vehicle import DOFS
 

@@ -39,12 +39,15 @@ from auv_analysis.report.faults import fault_figure
 from auv_analysis.report.panels import document, interactive, panel_sets
 from auv_analysis.report.run_plots import (
     APART,
+    _looks,
     _named_dashes,
     _symmetric,
     draw_figures,
+    energy,
+    energy_shares,
     inputs,
 )
-from auv_analysis.report.wrench_plots import _applied_caption, _panel
+from auv_analysis.report.wrench_plots import _applied_caption, _panel, applied_figure
 from auv_analysis.runs.run import Run
 from auv_gvc_controller.laws.model import control_model
 
@@ -248,13 +251,15 @@ def test_inputs_compared_are_those_of_their_runs(pair, three, runs, together: st
         assert (axes.get_xscale(), axes.get_yscale()) == ('log', 'linear')
 
 
-def test_captions_name_the_dashes_of_each_run(three, pair) -> None:
+def test_captions_name_the_dashes_of_each_run(three, pair, runs) -> None:
     assert 'one solid, two dashed and three dotted' in three[1]['inputs_compared']
     assert 'not drawn where the set-points of the runs differ' in three[1]['settling']
     dashes = [artists._look(h)['dashes'][1] for h in three[0]['settling'].legends[0].legend_handles]
     assert [None if d is None else len(d) for d in dashes] == [None, 2, 2]
     assert dashes[1][0] > dashes[2][0], 'a dash is longer than a dot'
     assert _named_dashes(dict.fromkeys('abcdefg')).endswith('f dash-dot-dotted and g solid')
+    looks = _looks(dict.fromkeys(range(24), runs['one']))
+    assert len({(look['color'], str(look['linestyle'])) for look in looks}) == 24
 
 
 @pytest.mark.parametrize('together', ['pair', 'three'])
@@ -322,6 +327,16 @@ def test_shares_of_the_mean_energy_are_those_of_their_runs(three, runs) -> None:
     assert low < min(found.values()) < max(found.values()) < high
     assert axes.get_ylim() == (5.5, -0.5)
     assert '0 to 10 s (filled) and of the whole run (open)' in three[1]['energy_shares']
+
+
+def test_energies_of_runs_of_unlike_length(runs) -> None:
+    run = replace(runs['one'], faults=())
+    parts = {name: run.part(slice(count)) for name, count in (('a', 61), ('b', 121), ('c', 181))}
+    parts['a'] = replace(parts['a'], nu=np.where(np.arange(6) == 2, np.nan, parts['a'].nu))
+    drawn = digests(parts)
+    assert '0 to 3 s (filled)' in energy_shares(drawn)[2], 'of b and c, which know theirs'
+    ends = [axes.get_xlim() for axes in energy(drawn, drawn['b'])[0].axes]
+    assert ends == [(START, parts[name].t[-1]) for name in 'cb'], 'all runs, the leading one'
 
 
 @pytest.mark.parametrize('name', ['one', 'two'])
@@ -553,7 +568,11 @@ def test_what_was_not_recorded_is_said_in_its_panel(runs, foreign, tmp_path) -> 
     for run in lost.values():
         run.nu[:, 1] = run.tau[:, 1] = np.nan
     alone, _ = _drawn({'told': replace(told, unexplained=wrench, faults=())}, tmp_path)
-    del lost['three']
+    acted = lost.pop('three')
+    applied = np.where(np.isin(np.arange(6), (1, 2)), np.nan, acted.applied)
+    panels = applied_figure(digests({'': replace(acted, applied=applied)})[''], None)[0].axes
+    empty = [axes.get_title(loc='left') for axes in panels if not len(axes.get_yticks())]
+    assert empty == ['(b) sway'], 'of heave there is the command'
     lost['one'].tau[:, 3] = 0.0
     lost['two'].nu[:, 2] = lost['two'].tau[:, 2] = np.nan  # heave is seen in the other run
     figures, captions = _drawn(lost, tmp_path)

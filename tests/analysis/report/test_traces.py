@@ -252,9 +252,13 @@ def test_errors_that_are_never_far_from_zero_have_settled_at_once(run) -> None:
         assert digest(near).settled == 0.0
 
 
-@pytest.mark.parametrize(('seconds', 'split'), [(4.0, False), (4.1, True)])
-def test_the_first_phase_is_drawn_apart_where_more_than_it_follows(seconds, split) -> None:
-    assert is_split(SimpleNamespace(duration=seconds)) is split
+@pytest.mark.parametrize(
+    ('seconds', 'step', 'split'), [(4.0, 0.1, False), (4.1, 2.0, True), (4.1, 2.05, False)]
+)
+def test_the_first_phase_is_drawn_apart_where_more_than_it_follows(seconds, step, split) -> None:
+    assert is_split(SimpleNamespace(duration=seconds, step=step)) is split, (
+        'of two samples at least'
+    )
 
 
 def test_a_figure_is_laid_out_alike_in_both_files(tmp_path: Path) -> None:

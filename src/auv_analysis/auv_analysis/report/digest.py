@@ -225,8 +225,8 @@ def signals(run: Run, model: ControlModel) -> dict[str, np.ndarray]:
 
 
 def is_split(run: Run | RunDigest) -> bool:
-    """Whether the first phase of a run is drawn apart."""
-    return run.duration > 2.0 * TRANSIENT
+    """Whether the first phase of a run is drawn apart: there are two samples in it at least."""
+    return run.duration > 2.0 * TRANSIENT and run.step <= TRANSIENT
 
 
 class _Builder:

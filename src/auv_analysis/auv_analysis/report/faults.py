@@ -25,7 +25,7 @@ from auv_analysis.output.text import Maths, capital, join, number
 from auv_analysis.report import plots
 from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.document import Block, Section, Sentence
-from auv_analysis.report.plots import DASHES, GREY, RUNS, Drawn, save_figures
+from auv_analysis.report.plots import GREY, Drawn, save_figures
 from auv_analysis.report.results import Shown, Table, described, view_of_file
 from auv_analysis.report.run_plots import common_bands, left_out
 from auv_analysis.runs.run import Run
@@ -139,11 +139,7 @@ def _panel(axes: Axes, runs: Mapping[str, RunDigest], i: int, band: float | None
 
 
 def _look(n: int) -> dict[str, Any]:
-    return {
-        'linestyle': DASHES[n % len(DASHES)],
-        'color': RUNS[n % len(RUNS)],
-        'linewidth': 0.9,
-    }
+    return plots.look(n) | {'linewidth': 0.9}
 
 
 ERROR, EFFORT = Maths('RMS of ν_d − ν'), 'RMS of τ'

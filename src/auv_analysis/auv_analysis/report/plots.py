@@ -51,9 +51,10 @@ DECADES = 4.0  # that a logarithmic scale spans at most
 APART = 20.0  # ratio of the extremes from which a scale is logarithmic
 BLANK = '#f2f2f2'
 ALWAYS = '≡ 0'  # zero for every motion
-RUNS = ('#1a1a1a', '#D55E00', '#0072B2', '#009E73', '#CC79A7', '#E69F00')  # of three runs and more
-MANY = (*RUNS, COLOURS[-1], '#8c8c8c')
-MOST_LINES = len(MANY)  # that can be told apart in a panel
+RUNS = (  # of three runs and more
+    '#1a1a1a', '#D55E00', '#0072B2', '#009E73', '#CC79A7', '#E69F00', COLOURS[-1], '#8c8c8c',
+)  # fmt: skip
+MOST_LINES = len(RUNS)  # that can be told apart in a panel
 STYLE = {
     'font.family': 'STIXGeneral', 'mathtext.fontset': 'stix', 'font.size': 8.3,
     'axes.labelsize': 8.3, 'axes.titlesize': 8.3, 'axes.titlepad': 4.4, 'axes.linewidth': 0.6,
@@ -175,7 +176,7 @@ class Panel:
 
 def look(index: int) -> dict[str, Any]:
     """Colour and dashes of one of `MOST_LINES` lines."""
-    return {'color': MANY[index % len(MANY)], 'linestyle': DASHES[index % len(DASHES)]}
+    return {'color': RUNS[index % len(RUNS)], 'linestyle': DASHES[index % len(DASHES)]}
 
 
 def small_multiples(

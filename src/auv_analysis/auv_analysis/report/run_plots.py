@@ -20,7 +20,7 @@ from auv_analysis.output.text import join, number
 from auv_analysis.report import plots
 from auv_analysis.report.digest import ESTIMATES, FOREVER, RunDigest, alike, common_window, digests
 from auv_analysis.report.panels import different_disturbances
-from auv_analysis.report.plots import COLOURS, DASHES, GREY, RUNS, Drawn, FigureRecord, save_figures
+from auv_analysis.report.plots import COLOURS, GREY, Drawn, FigureRecord, save_figures
 from auv_analysis.report.wrench_plots import (
     applied_figure,
     certificate_figure,
@@ -219,7 +219,7 @@ def _whole_panels(run: RunDigest, signal: str, quantity: Quantity, drawn: Sequen
 
 NO_TOTAL = 'not all velocities were recorded, so neither the total nor its shares are known.'
 GREY_LINE = ', and in grey that of a vehicle that moves exactly as the set-point{} asks'
-MARKERS = 'os^vPX'
+MARKERS = 'os^vPXD<>*ph'
 SMALLEST_SHARE = 1e-6  # %, left end of the logarithmic axis
 APART = 20.0  # ratio of peaks from which runs share no linear scale
 XI = tuple(rf'$\xi_{i}$' for i in range(1, 7))
@@ -332,8 +332,9 @@ def energy(runs: Mapping[str, RunDigest], leading: RunDigest) -> Drawn:
     _stack(right, leading)
     for axes in (left, right):
         plots.shade(axes, leading)
-    for index, axes in enumerate((left, right)):
-        axes.set_xlim(leading.start, leading.start + leading.duration)
+    for index, (axes, shown) in enumerate(((left, [*runs.values()]), (right, [leading]))):
+        ends = [run.start + run.duration for run in shown]
+        axes.set_xlim(min(run.start for run in shown), max(ends))
         axes.set_xlabel('$t$ (s)')
         plots.letter(axes, index)
     title = 'Kinetic energy'
@@ -347,12 +348,12 @@ def energy(runs: Mapping[str, RunDigest], leading: RunDigest) -> Drawn:
 
 def energy_shares(runs: Mapping[str, RunDigest]) -> Drawn:
     """Shares of the mean kinetic energy on a logarithmic axis."""
+    end = common_window(runs)
     runs = {name: run for name, run in runs.items() if not run.unknown}
     if not runs:
         return None, 'Shares of kinetic energy', f'Shares of kinetic energy: {NO_TOTAL}'
     figure = plots.new_figure(2.9)
     axes = figure.subplots()
-    end = common_window(runs)
     rows = len(runs)
     offsets = (np.arange(rows) - (rows - 1) / 2) * 0.62 / max(rows, 2)
     handles, smallest = [], 1.0
@@ -371,7 +372,7 @@ def energy_shares(runs: Mapping[str, RunDigest]) -> Drawn:
     axes.set_yticklabels([f'{XI[i]} {DOFS[i]}' for i in range(6)])
     axes.tick_params(axis='y', length=0)
     axes.set_xlabel('share of the mean kinetic energy (%)')
-    axes.legend(handles, [*runs], loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=rows)
+    axes.legend(handles, [*runs], loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=min(rows, 4))
     title = 'Shares of kinetic energy'
     caption = (
         f'{title}: mean of the samples of 0 to {end:g} s (filled) and of the whole run '
@@ -397,10 +398,7 @@ def _stack(axes: Axes, run: RunDigest) -> None:
 def _looks(runs: Mapping[str, RunDigest], colour: str = 'black') -> list[dict[str, Any]]:
     """Dashes per run; of three runs and more, or noisy ones, a colour per run for the given one."""
     many = len(runs) > 2 or any(run.sensing for run in runs.values())
-    return [
-        {'linestyle': DASHES[i % len(DASHES)], 'color': RUNS[i % len(RUNS)] if many else colour}
-        for i in range(len(runs))
-    ]
+    return [plots.look(i) | ({} if many else {'color': colour}) for i in range(len(runs))]
 
 
 def _symmetric(axes: Axes, peaks: list[float]) -> bool:

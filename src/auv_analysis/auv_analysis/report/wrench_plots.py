@@ -74,11 +74,13 @@ def _panel(axes: Axes, run: RunDigest, i: int, bound: float | None) -> bool:
     axes.set_xlim(run.start, run.start + run.duration)
     plots.shade(axes, run)
     seen = run.part('applied').peak[i]
+    if np.isnan([seen, command.peak[i]]).all():
+        leave_out(axes)
     if bound is not None and bound <= BEYOND * max(seen, command.peak[i]):
         seen = max(seen, bound)
         for level in (-bound, bound):
             axes.axhline(level, **LIMIT)
-    if not seen or command.peak[i] <= BEYOND * seen:
+    if not command.peak[i] > BEYOND * seen > 0.0:  # or one of them is not known
         return False
     axes.set_ylim(-ROOM * seen, ROOM * seen)
     peak = command.low[i] if command.low[i] == -command.peak[i] else command.high[i]

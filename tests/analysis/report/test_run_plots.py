@@ -211,6 +211,13 @@ def test_a_line_breaks_a_step_behind_the_begin_of_a_gap(three) -> None:
     assert t[np.isnan(y)] == pytest.approx([8.0 + STEP])
 
 
+def test_names_that_are_too_long_for_a_legend_are_cut_in_their_middle() -> None:
+    assert plots.fitting(['gvc', 'cl', 'pid'], 2) == (['gvc', 'cl', 'pid'], 2)
+    assert plots.fitting(['x' * 12, 'cl'], 3, room=40) == (['x' * 12, 'cl'], 2)
+    assert plots.fitting(['x' * 13, 'cl'], 3, room=40) == (['x' * 13, 'cl'], 1)
+    assert plots.fitting(['a' * 50 + 'z' * 50, 'cl'], 3, room=18) == (['aaaaa…zzzzz', 'cl'], 1)
+
+
 @pytest.mark.parametrize('together', ['pair', 'three'])
 def test_errors_still_to_come_are_those_of_their_runs(pair, three, runs, together: str) -> None:
     figure = (pair if together == 'pair' else three)[0]['settling']

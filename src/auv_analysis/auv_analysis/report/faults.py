@@ -109,7 +109,8 @@ def fault_figure(runs: Mapping[str, RunDigest]) -> Drawn:
         plots.letter(axes, i, DOFS[i])
     panels[-1].set_xlabel('$t$ (s)')
     handles = [Line2D([], [], **_look(n)) for n in range(len(runs))]
-    figure.legend(handles, list(runs), loc='outside upper right', ncols=4, handlelength=2.6)
+    names, columns = plots.fitting([*runs], 4)
+    figure.legend(handles, names, loc='outside upper right', ncols=columns, handlelength=2.6)
     named = [f'{mark.number}  {mark.label}, {mark.times}' for mark in first.faults]
     patches = [Patch(color=plots.FAULT) for _ in named]
     figure.legend(patches, named, loc='outside lower left', ncols=2)

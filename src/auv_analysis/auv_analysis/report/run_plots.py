@@ -219,6 +219,7 @@ def _whole_panels(run: RunDigest, signal: str, quantity: Quantity, drawn: Sequen
 
 NO_TOTAL = 'not all velocities were recorded, so neither the total nor its shares are known.'
 GREY_LINE = ', and in grey that of a vehicle that moves exactly as the set-point{} asks'
+HALF = 60  # characters of a legend above one of two panels
 MARKERS = 'os^vPXD<>*ph'
 SMALLEST_SHARE = 1e-6  # %, left end of the logarithmic axis
 APART = 20.0  # ratio of peaks from which runs share no linear scale
@@ -320,13 +321,8 @@ def energy(runs: Mapping[str, RunDigest], leading: RunDigest) -> Drawn:
         handles = left.plot(*leading.drawn('wanted'), color='#b5b5b5', linewidth=3.2)
     for look, run in zip(_looks(runs), runs.values(), strict=True):
         handles += left.plot(*run.drawn('kinetic'), **look)
-    left.legend(
-        handles,
-        [*wanted, *runs],
-        loc='lower right',
-        bbox_to_anchor=(1.0, 1.02),
-        ncols=3,
-    )
+    names, columns = plots.fitting([*wanted, *runs], 3, HALF)
+    left.legend(handles, names, loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=columns)
     left.set_ylim(bottom=0.0)
     left.set_ylabel('kinetic energy (J)')
     _stack(right, leading)
@@ -372,7 +368,8 @@ def energy_shares(runs: Mapping[str, RunDigest]) -> Drawn:
     axes.set_yticklabels([f'{XI[i]} {DOFS[i]}' for i in range(6)])
     axes.tick_params(axis='y', length=0)
     axes.set_xlabel('share of the mean kinetic energy (%)')
-    axes.legend(handles, [*runs], loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=min(rows, 4))
+    names, columns = plots.fitting([*runs], 4)
+    axes.legend(handles, names, loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=columns)
     title = 'Shares of kinetic energy'
     caption = (
         f'{title}: mean of the samples of 0 to {end:g} s (filled) and of the whole run '
@@ -421,9 +418,8 @@ def _six_panels(runs: Mapping[str, RunDigest]) -> tuple[Figure, list[Axes]]:
     for i, axes in enumerate(panels):
         plots.letter(axes, i, DOFS[i])
     handles = [Line2D([], [], **look) for look in _looks(runs)]
-    figure.legend(
-        handles, list(runs), loc='outside upper right', ncols=min(len(runs), 4), handlelength=2.6
-    )
+    names, columns = plots.fitting([*runs], 4)
+    figure.legend(handles, names, loc='outside upper right', ncols=columns, handlelength=2.6)
     for axes in panels[3:]:
         axes.set_xlabel('$t$ (s)')
     return figure, panels

@@ -31,7 +31,7 @@ from auv_analysis.output.new_files import (
     unfinished_name,
     write_text,
 )
-from auv_dynamics.files.errors import FailedError, InputError
+from auv_dynamics.files.errors import FailedError, InputError, printable
 from auv_dynamics.files.shipped import shipped
 
 EARLIER = {
@@ -84,7 +84,7 @@ def refused(out: Path, *, overwrite: bool, **options: Any) -> str:
     ):
         pytest.fail('work has begun')
     line = str(caught.value)
-    assert line.startswith(str(out))
+    assert line.startswith(printable(str(out)))
     assert ', found ' in line
     assert len(line.splitlines()) == 1
     return line
@@ -412,7 +412,9 @@ def test_columns_are_of_numbers_where_all_of_them_are() -> None:
 
 
 @pytest.mark.parametrize('overwrite', [False, True])
-@pytest.mark.parametrize('kind', ['file', 'below a file', 'broken link', 'link to itself', 'long'])
+@pytest.mark.parametrize(
+    'kind', ['file', 'below a file', 'broken link', 'link to itself', 'long', 'no text']
+)
 def test_path_that_can_be_no_folder_is_refused(kind, overwrite, tmp_path) -> None:
     out = tmp_path / 'out'
     if kind in ('file', 'below a file'):
@@ -422,7 +424,8 @@ def test_path_that_can_be_no_folder_is_refused(kind, overwrite, tmp_path) -> Non
     elif kind == 'link to itself':
         out.symlink_to('out')
     before = tree(tmp_path)
-    asked = {'below a file': out / 'x', 'long': tmp_path / ('n' * 300)}.get(kind, out)
+    names = {'long': 'n' * 300, 'no text': '\udcff'}  # the byte ff is no UTF-8
+    asked = out / 'x' if kind == 'below a file' else tmp_path / names.get(kind, 'out')
     refused(asked, overwrite=overwrite)
     assert tree(tmp_path) == before
     assert not out.is_file() or out.read_text() == 'mine'

@@ -190,8 +190,11 @@ def _make(out: Path) -> list[Path]:
     """Make a folder and see that it can be written; those that were not there, innermost first."""
     try:
         missing = [path for path in (out, *out.parents) if not path.exists()]
+        str(out).encode()  # Arrow takes no other names
         out.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=out).close()
+    except UnicodeEncodeError:
+        raise InputError(out, '--out', 'a name in UTF-8', 'other bytes') from None
     except OSError as error:
         found = reason(error)
         raise InputError(out, '--out', 'a folder that can be written', found) from None

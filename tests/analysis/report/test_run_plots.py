@@ -45,6 +45,7 @@ from auv_analysis.report.run_plots import (
     draw_figures,
     energy,
     energy_shares,
+    fitting,
     inputs,
 )
 from auv_analysis.report.wrench_plots import _applied_caption, _panel, applied_figure
@@ -212,10 +213,10 @@ def test_a_line_breaks_a_step_behind_the_begin_of_a_gap(three) -> None:
 
 
 def test_names_that_are_too_long_for_a_legend_are_cut_in_their_middle() -> None:
-    assert plots.fitting(['gvc', 'cl', 'pid'], 2) == (['gvc', 'cl', 'pid'], 2)
-    assert plots.fitting(['x' * 12, 'cl'], 3, room=40) == (['x' * 12, 'cl'], 2)
-    assert plots.fitting(['x' * 13, 'cl'], 3, room=40) == (['x' * 13, 'cl'], 1)
-    assert plots.fitting(['a' * 50 + 'z' * 50, 'cl'], 3, room=18) == (['aaaaa…zzzzz', 'cl'], 1)
+    assert fitting(['gvc', 'cl', 'pid'], 2) == (['gvc', 'cl', 'pid'], 2)
+    assert fitting(['x' * 12, 'cl'], 3, room=40) == (['x' * 12, 'cl'], 2)
+    assert fitting(['x' * 13, 'cl'], 3, room=40) == (['x' * 13, 'cl'], 1)
+    assert fitting(['a' * 50 + 'z' * 50, 'cl'], 3, room=18) == (['aaaaa…zzzzz', 'cl'], 1)
 
 
 @pytest.mark.parametrize('together', ['pair', 'three'])

@@ -197,7 +197,7 @@ def test_a_restart_of_the_vehicle_is_noticed_and_stamps_go_on() -> None:
 def test_of_what_was_sent_to_a_vehicle_that_shows_no_inputs_little_is_kept() -> None:
     pair = Pair()
     pair.down = lambda data: b'' if data[7] == mavlink.MAVLINK_MSG_ID_RC_CHANNELS else data
-    pair.flown(PUSH).run(1.0, tau=PUSH)
+    pair.flown(PUSH).run(1.8, tau=PUSH)
     assert 90 < len(pair.link._inputs) <= 101, 'of two seconds, at 50 Hz'
     assert max(pulses(pair)) > 1550
 

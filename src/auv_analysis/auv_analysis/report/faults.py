@@ -27,7 +27,7 @@ from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.document import Block, Section, Sentence
 from auv_analysis.report.plots import GREY, Drawn, save_figures
 from auv_analysis.report.results import Shown, Table, described, view_of_file
-from auv_analysis.report.run_plots import common_bands, left_out
+from auv_analysis.report.run_plots import common_bands, fitting, left_out
 from auv_analysis.runs.run import Run
 from auv_dynamics.vehicle import DOFS
 
@@ -109,7 +109,7 @@ def fault_figure(runs: Mapping[str, RunDigest]) -> Drawn:
         plots.letter(axes, i, DOFS[i])
     panels[-1].set_xlabel('$t$ (s)')
     handles = [Line2D([], [], **_look(n)) for n in range(len(runs))]
-    names, columns = plots.fitting([*runs], 4)
+    names, columns = fitting([*runs], 4)
     figure.legend(handles, names, loc='outside upper right', ncols=columns, handlelength=2.6)
     named = [f'{mark.number}  {mark.label}, {mark.times}' for mark in first.faults]
     patches = [Patch(color=plots.FAULT) for _ in named]

@@ -54,7 +54,6 @@ ALWAYS = '≡ 0'  # zero for every motion
 RUNS = (  # of three runs and more
     '#1a1a1a', '#D55E00', '#0072B2', '#009E73', '#CC79A7', '#E69F00', COLOURS[-1], '#8c8c8c',
 )  # fmt: skip
-LONG_HANDLE = 8  # characters that a line takes in a legend, with what parts it from the next one
 MOST_LINES = len(RUNS)  # that can be told apart in a panel
 STYLE = {
     'font.family': 'STIXGeneral', 'mathtext.fontset': 'stix', 'font.size': 8.3,
@@ -229,22 +228,6 @@ def shared_legend(figure: Figure, place: str = 'outside upper right') -> None:
     if named:
         look: dict[str, Any] = {'loc': place, 'ncols': min(len(named), 6), 'handlelength': 2.4}
         figure.legend([*named.values()], [*named], **look)
-
-
-def fitting(names: Sequence[str], columns: int, room: int = 115) -> tuple[list[str], int]:
-    """Names that fit into a legend, cut in their middle, and its columns.
-
-    Parameters
-    ----------
-    names : of the lines
-    columns : at most
-    room : characters beside each other, handles included
-
-    """
-    most = room - LONG_HANDLE
-    short = [n if len(n) <= most else f'{n[: most // 2]}…{n[-(most // 2) :]}' for n in names]
-    longest = max(map(len, short), default=1) + LONG_HANDLE
-    return short, max(min(columns, len(short), room // longest), 1)
 
 
 def distribution(

@@ -220,6 +220,7 @@ def _whole_panels(run: RunDigest, signal: str, quantity: Quantity, drawn: Sequen
 NO_TOTAL = 'not all velocities were recorded, so neither the total nor its shares are known.'
 GREY_LINE = ', and in grey that of a vehicle that moves exactly as the set-point{} asks'
 HALF = 60  # characters of a legend above one of two panels
+LONG_HANDLE = 8  # characters that a line takes in a legend, with what parts it from the next one
 MARKERS = 'os^vPXD<>*ph'
 SMALLEST_SHARE = 1e-6  # %, left end of the logarithmic axis
 APART = 20.0  # ratio of peaks from which runs share no linear scale
@@ -308,6 +309,22 @@ def inputs(runs: Mapping[str, RunDigest]) -> tuple[Figure, str, str]:
     return figure, title, caption
 
 
+def fitting(names: Sequence[str], columns: int, room: int = 115) -> tuple[list[str], int]:
+    """Names that fit into a legend, cut in their middle, and its columns.
+
+    Parameters
+    ----------
+    names : of the lines
+    columns : at most
+    room : characters beside each other, handles included
+
+    """
+    most = room - LONG_HANDLE
+    short = [n if len(n) <= most else f'{n[: most // 2]}…{n[-(most // 2) :]}' for n in names]
+    longest = max(map(len, short), default=1) + LONG_HANDLE
+    return short, max(min(columns, len(short), room // longest), 1)
+
+
 def energy(runs: Mapping[str, RunDigest], leading: RunDigest) -> Drawn:
     """Kinetic energy over time and its shares. Returns figure, title and caption."""
     if leading.unknown:
@@ -321,7 +338,7 @@ def energy(runs: Mapping[str, RunDigest], leading: RunDigest) -> Drawn:
         handles = left.plot(*leading.drawn('wanted'), color='#b5b5b5', linewidth=3.2)
     for look, run in zip(_looks(runs), runs.values(), strict=True):
         handles += left.plot(*run.drawn('kinetic'), **look)
-    names, columns = plots.fitting([*wanted, *runs], 3, HALF)
+    names, columns = fitting([*wanted, *runs], 3, HALF)
     left.legend(handles, names, loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=columns)
     left.set_ylim(bottom=0.0)
     left.set_ylabel('kinetic energy (J)')
@@ -368,7 +385,7 @@ def energy_shares(runs: Mapping[str, RunDigest]) -> Drawn:
     axes.set_yticklabels([f'{XI[i]} {DOFS[i]}' for i in range(6)])
     axes.tick_params(axis='y', length=0)
     axes.set_xlabel('share of the mean kinetic energy (%)')
-    names, columns = plots.fitting([*runs], 4)
+    names, columns = fitting([*runs], 4)
     axes.legend(handles, names, loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=columns)
     title = 'Shares of kinetic energy'
     caption = (
@@ -418,7 +435,7 @@ def _six_panels(runs: Mapping[str, RunDigest]) -> tuple[Figure, list[Axes]]:
     for i, axes in enumerate(panels):
         plots.letter(axes, i, DOFS[i])
     handles = [Line2D([], [], **look) for look in _looks(runs)]
-    names, columns = plots.fitting([*runs], 4)
+    names, columns = fitting([*runs], 4)
     figure.legend(handles, names, loc='outside upper right', ncols=columns, handlelength=2.6)
     for axes in panels[3:]:
         axes.set_xlabel('$t$ (s)')

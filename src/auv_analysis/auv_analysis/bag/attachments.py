@@ -119,11 +119,16 @@ def kinds_of(contents: BagContents, bag: Path) -> frozenset[str] | None:
     )
 
 
+def folder_name(name: str) -> str:
+    """A folder's name as a terminal and figures, which set formulas by $, can show it."""
+    return printable(name).replace('$', '_')
+
+
 def scenario_name(contents: BagContents, bag: Path) -> str:
     """Name of the scenario; without its file, that of the folder around the bag."""
     text, file = contents.attachments.get('scenario.yaml'), f'{bag}: scenario.yaml'
     if text is None:
-        return printable(bag.resolve().parent.name).replace('$', '_')
+        return folder_name(bag.resolve().parent.name)
     name = parse_yaml(text, file, 'scenario').get('name')
     if not (isinstance(name, str) and NAME.fullmatch(name)):
         raise InputError(file, 'name', 'a word without blanks or slashes', name)

@@ -16,6 +16,18 @@ AVERAGED = 1.5  # intervals per step of the time base from which a signal is ave
 ENOUGH = 12  # velocity samples of a stretch, fewer are left out: no rate could be estimated
 
 
+def usual_interval(times: np.ndarray, limit: float = np.inf) -> float:
+    """Median interval of rising times (n,), in bursts the mean one; inf of a single time.
+
+    A gap counts as an interval of `limit`.
+    """
+    if len(times) < 2:
+        return np.inf
+    apart = np.diff(times)
+    median, mean = float(np.median(apart)), float(np.minimum(apart, limit).mean())
+    return mean if median < BURST * mean else median
+
+
 @dataclass(frozen=True, eq=False)
 class Track:
     """A signal in our axes, with rising stamps.
@@ -49,10 +61,7 @@ class Track:
     @property
     def period(self) -> float:
         """Median interval, in bursts the mean one between gaps, ns; inf of a single sample."""
-        if len(self.ns) < 2:
-            return np.inf
-        mean = float(np.minimum(np.diff(self.ns), self.limit).mean())
-        return mean if self._interval < BURST * mean else self._interval
+        return usual_interval(self.ns, self.limit)
 
     @property
     def _interval(self) -> float:

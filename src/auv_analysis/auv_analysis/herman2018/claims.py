@@ -256,14 +256,11 @@ def _is_case(run: RunDigest, case: Scenario) -> bool:
     if run.knows_disturbance:
         wanted['F'] = make_disturbance(case.data['disturbance'])(t)
     begun = np.allclose(run.begin, np.concatenate(case.initial), 0.0, TINY)
-    return (
-        begun
-        and np.allclose(run.vehicle.M, case.vehicle.M)
-        and all(
-            name in run.course
-            and np.allclose(run.course[name], values, 0.0, SAME * np.abs(values).max(axis=0) + TINY)
-            for name, values in wanted.items()
-        )
+    same = begun and np.allclose(run.vehicle.M, case.vehicle.M)
+    return same and all(
+        name in run.course
+        and np.allclose(run.course[name], values, 0.0, SAME * np.abs(values).max(axis=0) + TINY)
+        for name, values in wanted.items()
     )
 
 

@@ -11,7 +11,7 @@ from auv_analysis.metrics.summary import SETTLED, TRANSIENT
 from auv_analysis.output.text import GAINS
 from auv_dynamics.vehicle import DOFS
 
-VELOCITY, WRENCH, SECONDS = ('m/s', 'rad/s'), ('N', 'N m'), ('s', 's')
+VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
 HALVES = {'linear': DOFS[:3], 'angular': DOFS[3:]}
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple, Protocol
 
 from auv_analysis.bag.any_bag import survey
+from auv_analysis.bag.attachments import folder_name
 from auv_analysis.bag.foreign_topics import TopicMap, other_odometries, with_candidates
 from auv_analysis.bag.load import Recording, open_bag
 from auv_analysis.bag.metadata import IN_FOLDERS, files_of, is_csv, is_mcap
@@ -16,7 +17,7 @@ from auv_analysis.runs.run import Hold, Run
 from auv_analysis.runs.samples import ENDING, load_samples
 from auv_analysis.scenario.scenario import Scenario, load_scenario
 from auv_analysis.simulation.simulate import announce, simulate
-from auv_dynamics.files.errors import InputError, printable, reason
+from auv_dynamics.files.errors import InputError, reason
 from auv_dynamics.files.shipped import shipped_by_name
 from auv_dynamics.files.yaml_files import read_yaml
 from auv_dynamics.ros.interface import ODOM
@@ -319,7 +320,7 @@ def _folders(source: RunSource, depth: int) -> tuple[str, ...]:
     if source.kind == 'scenario':
         return ('simulated', source.path.stem)
     parts = Path(source.path).resolve().parent.parts[1:][-depth:]
-    return tuple(printable(part).replace('$', '_') for part in parts)  # figures set formulas by $
+    return tuple(map(folder_name, parts))
 
 
 def numbered(names: Sequence[str]) -> list[str]:

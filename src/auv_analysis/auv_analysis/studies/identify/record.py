@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.bag.tracks import BURST, Track, between_gaps, integral
+from auv_analysis.bag.tracks import Track, between_gaps, integral, usual_interval
 from auv_analysis.metrics.local_polynomials import ORDER, SMALLEST, variance, weights, windows
 from auv_dynamics.kernel.compile import plain
 from auv_dynamics.ros.interface import NANOSECONDS, WRENCH
@@ -138,13 +138,6 @@ def continuous(q: np.ndarray) -> np.ndarray:
     """Quaternions (n, 4) of the same attitudes whose signs do not jump."""
     flips = np.where((q[1:] * q[:-1]).sum(axis=1) < 0, -1.0, 1.0)
     return q * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
-
-
-def usual_interval(t: np.ndarray) -> float:
-    """Median interval of rising times (n,), the mean one of those that come in bursts; s."""
-    apart = np.diff(t)
-    median, mean = float(np.median(apart)), float(apart.mean())
-    return mean if median < BURST * mean else median
 
 
 def smoothed(t: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndarray:

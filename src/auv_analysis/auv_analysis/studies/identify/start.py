@@ -9,14 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from auv_analysis.bag.tracks import usual_interval
 from auv_analysis.metrics.local_polynomials import SMALLEST, rates
-from auv_analysis.studies.identify.record import (
-    Record,
-    continuous,
-    down_of,
-    smoothed,
-    usual_interval,
-)
+from auv_analysis.studies.identify.record import Record, continuous, down_of, smoothed
 from auv_analysis.studies.identify.unknowns import LOWER, Coefficients, Unknowns
 from auv_dynamics.kernel.compile import plain
 from auv_dynamics.vehicle import DOFS
@@ -72,7 +67,7 @@ def _regressors(record: Record) -> tuple[Record, np.ndarray, np.ndarray] | None:
     """Times (k,) and Y (k, 6, 21 + 6 + 6 + 4): tau = Y [M, D_linear, D_quadratic, hydrostatics]."""
     there = np.isfinite(record.velocity).all(axis=1)
     t, nu = record.velocity_t[there], record.velocity[there]
-    period = usual_interval(t) if len(t) > 1 else np.inf
+    period = usual_interval(t)
     inside = (t > record.start + WINDOW + DELAYS[-1]) & (t < record.end - WINDOW)
     at = t[inside][:: max(int(inside.sum() / MOST), 1)]
     if SMALLEST * period > WIDEST or len(at) < 60:

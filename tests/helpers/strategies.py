@@ -22,12 +22,22 @@ QUICK = examples(10)
 
 def vectors(n: int = 6, largest: float = 3.0) -> st.SearchStrategy[np.ndarray]:
     """(n,) finite numbers within +-largest."""
-    return _dense(n, largest)
-
-
-def _dense(shape: Any, largest: float) -> st.SearchStrategy[np.ndarray]:
     elements = st.floats(-largest, largest, allow_subnormal=False)
-    return arrays(float, shape, elements=elements, fill=st.nothing())  # each entry its own
+    return arrays(float, n, elements=elements, fill=st.nothing())  # each entry its own
+
+
+def _dense(n: int, largest: float) -> st.SearchStrategy[np.ndarray]:
+    """(n, n) numbers within +-largest, zeros and +-largest among them, all by one draw.
+
+    Entries drawn one by one take most of the time of a test.
+    """
+
+    def entries(seed: int) -> np.ndarray:
+        rng = np.random.default_rng(seed)
+        edges = rng.choice([-largest, 0.0, largest], (n, n))
+        return np.where(rng.random((n, n)) < 0.1, edges, rng.uniform(-largest, largest, (n, n)))
+
+    return st.integers(0, 2**32 - 1).map(entries)
 
 
 def attitudes(pitch: float = 1.3) -> st.SearchStrategy[np.ndarray]:
@@ -46,7 +56,7 @@ def _signed(smallest: float, largest: float) -> st.SearchStrategy[float]:
 @st.composite
 def positive_definite(draw: st.DrawFn, n: int = 6) -> np.ndarray:
     """(n, n) dense, symmetric, eigenvalues from 0.1 to a few."""
-    A = draw(_dense((n, n), 1.0))
+    A = draw(_dense(n, 1.0))
     P = 0.1 * np.eye(n) + A @ A.T / n
     return (P + P.T) / 2
 
@@ -75,7 +85,7 @@ def vehicles(draw: st.DrawFn, heavy_water: bool | None = None) -> dict[str, Any]
     length = np.array([1.0, 1.0, 1.0, 0.4, 0.4, 0.4])
     added = mass * (20.0 if heavy else 0.5) * np.outer(length, length) * draw(positive_definite())
     linear = mass * draw(positive_definite())
-    twist = draw(_dense((6, 6), 0.1))
+    twist = draw(_dense(6, 0.1))
     linear = linear + mass * (twist - twist.T)  # damping may be asymmetric
     quadratic = mass * np.diag(np.abs(draw(vectors())))
     sign = draw(st.sampled_from(('positive', 'sname')))

@@ -43,8 +43,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     text = 'base points of sobol, a power of two; trajectories of morris'
     command.add_argument('--samples', type=int, metavar='N', help=text)
     text = 'gains vary from 1/SPAN to SPAN times their value; default: 2'
-    command.add_argument('--span', type=number(above=1, at_most=1e3), default=2.0, help=text)
-    command.add_argument('--seed', type=whole(0), default=0, help='random seed; default: 0')
+    command.add_argument('--span', type=number(above=1, at_most=1e3), help=text)
+    command.add_argument('--seed', type=whole(0), help='random seed; default: 0')
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
@@ -63,6 +63,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
     scenario, names = open_scenario(options)
     windows = [_window(scenario, first, last) for first, last in options.window]
+    if options.sensitivity == 'none':
+        refuse_given(options, ('samples', 'span', 'seed'), 'sobol or morris', '--sensitivity none')
     _check_samples(options)
     if not options.run:
         refuse_given(options, ('domain_id', 'composed'), '--run beside it', None)
@@ -153,7 +155,8 @@ def _sensitivities(
         with waiting(f'{scenario.name} {name}: varying the gains'):
             found[name] = sensitivity(
                 scenario, name, method=options.sensitivity, count=options.samples,
-                span=options.span, seed=options.seed, hold=options.hold, threads=_threads(),
+                span=options.span or 2.0, seed=options.seed or 0, hold=options.hold,
+                threads=_threads(),
             )  # fmt: skip
         if found[name].refusal:
             say(f'note: {name}: no sensitivity to the gains: {found[name].refusal}')

@@ -1,5 +1,6 @@
 """Live analysis as a node: kinetic energy, couplings and lumped error of every tenth step."""
 
+import time
 from collections import OrderedDict
 from typing import Any
 
@@ -10,8 +11,7 @@ from auv_analysis.metrics.coupling import LiveAnalysis
 from auv_dynamics import load_vehicle
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.codec import first_stamp
-from auv_dynamics.ros.endpoints import why_silent
-from auv_dynamics.ros.node_interface import OK, STALE, Health, NodeInterface
+from auv_dynamics.ros.node_interface import NodeInterface, hears_odometry
 from auv_dynamics.ros.node_main import BulkNode, main_of
 from auv_dynamics.ros.parameters import declare_settings
 
@@ -43,13 +43,9 @@ class AnalysisNode(BulkNode):
         self._codecs = {topic: self.graph.codec(topic) for topic in HEARD}
         for topic in HEARD:
             self._watch(topic)
-        self.graph.in_trouble_while(self._trouble)
+        self._heard: float | None = None  # steady clock, s
+        self.graph.in_trouble_while(lambda: hears_odometry(self, self._odometry, self._heard))
         self.begin(f'analyses one step in {self._every} of {self.graph.hardware_id}')
-
-    def _trouble(self) -> Health:
-        if self._k:
-            return OK, ''
-        return STALE, why_silent(self, self._odometry) or 'no odometry yet'
 
     def _watch(self, topic: topics.Topic) -> None:
         def callback(message: bytes, _: dict[str, Any]) -> None:
@@ -62,6 +58,7 @@ class AnalysisNode(BulkNode):
         waiting = self._waiting[topic]
         waiting[ns] = message
         if topic is topics.ODOM:
+            self._heard = time.monotonic()
             if self._k % self._every == 0:
                 self._due[ns] = set(HEARD)
                 self.graph.latest_ns = ns

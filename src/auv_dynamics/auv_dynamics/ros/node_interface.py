@@ -26,7 +26,7 @@ from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant
 from auv_dynamics.ros.codec import Codec
 from auv_dynamics.ros.convert import stamp
-from auv_dynamics.ros.endpoints import crowds, has_conflict, onlookers
+from auv_dynamics.ros.endpoints import crowds, has_conflict, onlookers, why_silent
 from auv_dynamics.ros.interface import BadMessageError, Frames
 from auv_dynamics.ros.parameters import declare
 from auv_dynamics.ros.rclpy_internals import has_data_path
@@ -47,6 +47,7 @@ LOUD = 1.0  # s between two reports of the same kind
 ASK_AGAIN = 1.0  # s: an answer is lost when it comes before both ends have matched
 LASTING = 1.0  # s, after which what is wrong is logged: names and matches may come late
 REPEATED = 10.0  # s between two logs of what is wrong and lasts
+SILENT = 2.0  # s without odometry in real time, after which it is missed
 OK, WARN = DiagnosticStatus.OK, DiagnosticStatus.WARN
 STALE, ERROR = DiagnosticStatus.STALE, DiagnosticStatus.ERROR
 WORSE = (OK, WARN, STALE, ERROR)
@@ -64,6 +65,16 @@ def worst(found: list[Health]) -> Health:
     return max(
         (one for one in found if one[1]), key=lambda one: WORSE.index(one[0]), default=(OK, '')
     )
+
+
+def hears_odometry(node: Any, topic: Topic, last: float | None) -> Health:
+    """Whether a node hears it, in lock-step whether it ever did; `last`: when, steady clock, s."""
+    if last is None:
+        return STALE, why_silent(node, topic) or 'no odometry yet'
+    since = time.monotonic() - last
+    if node.lockstep or since < SILENT:
+        return OK, ''
+    return STALE, why_silent(node, topic) or f'no odometry for {since:.0f} s'
 
 
 class Lasting:

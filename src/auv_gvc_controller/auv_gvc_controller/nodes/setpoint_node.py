@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from auv_dynamics.ros import interface, topics
-from auv_dynamics.ros.endpoints import why_silent
-from auv_dynamics.ros.node_interface import OK, STALE, Health, NodeInterface, steady_timer
+from auv_dynamics.ros.node_interface import NodeInterface, hears_odometry, steady_timer
 from auv_dynamics.ros.node_main import BulkNode, main_of
 from auv_dynamics.ros.parameters import declare_settings
 from auv_gvc_controller.control.odometry_guard import Limits, Now, OdometryGuard
@@ -43,17 +42,13 @@ class SetpointNode(BulkNode):
         self._rows = np.empty(0)  # of the steps from `_first` on
         # in lock-step the odometry asks; this is for when the subscribers match after it
         steady_timer(self, 0.1 if self.lockstep else 0.02, self._publish)
-        self.graph.in_trouble_while(self._trouble)
+        self._heard: float | None = None  # steady clock, s
+        self.graph.in_trouble_while(lambda: hears_odometry(self, topics.ODOM, self._heard))
         self.begin(f'publishes set-points every {grid.step:g} s, once there is odometry')
 
-    def _trouble(self) -> Health:
-        if self._guard.last is not None:
-            return OK, ''
-        return STALE, why_silent(self, topics.ODOM) or 'no odometry yet'
-
     def _on_odometry(self, ns: int, _: tuple[float, ...]) -> None:
-        restarts = self._guard.restarts
-        elapsed = self._guard.accept(ns, (), Now(time.monotonic()))  # whatever the speed
+        self._heard, restarts = time.monotonic(), self._guard.restarts
+        elapsed = self._guard.accept(ns, (), Now(self._heard))  # whatever the speed
         newest = (ns - self._guard.origin) // self._step_ns
         if elapsed:
             gap = max(1, newest - self._newest)

@@ -30,6 +30,7 @@ from auv_analysis.studies.identify.identify import (
     split,
 )
 from auv_analysis.studies.identify.output_error import _lagged, delayed, on_steps
+from auv_analysis.studies.identify.plausibility import too_short
 from auv_analysis.studies.identify.prediction import Prediction, held_of, predict, sizes
 from auv_analysis.studies.identify.record import (
     Record,
@@ -403,6 +404,19 @@ def test_pauses_of_several_topics_end_a_stretch_as_those_of_one_do_and_a_told_ga
         for twist in (parts[0], assembled(parts, Path('x'))):
             found = of_tracks('x', one | {'twist': twist})
             assert len(found) == (2 if told and gap < 4e8 else 1)
+
+
+@pytest.mark.parametrize(('steps', 'said'), [
+    ((30, 30), ''), ((29, 45, 40), '1.45 s in 1 of 3 stretches are used for the first guess only'),
+    ((29, 45, 20), '2.45 s in 2 of 3 stretches'),
+])  # fmt: skip
+def test_recordings_too_short_for_a_segment_are_told(steps, said):
+    training = [record(10.0, 0.05).part(0.0, 0.05 * n) for n in steps]
+    segment = SimpleNamespace(before=np.zeros((10, 6)), command=np.zeros((20, 6)))
+    problem = SimpleNamespace(segments=[segment], step=0.05)
+    found = too_short(SimpleNamespace(training=training, problem=problem))
+    assert len(found) == bool(said)
+    assert said in ''.join(found)
 
 
 def test_a_component_that_never_changes_is_no_measurement():

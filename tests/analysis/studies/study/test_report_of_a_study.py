@@ -121,6 +121,10 @@ def test_pieces_and_shares_of_the_files_add_up(folder):
         (['--samples', '6'], '--samples: expected a power of two from 2 on, found 6'),
         (['--seed', '-1'], '--seed: expected a whole number from 0 on, found -1'),
         (['--controller', 'x'], 'expected one of gvc, cl'),
+        (
+            ['--sensitivity', 'none', '--seed', '0'],
+            '--seed: expected sobol or morris, found --sensitivity none',
+        ),
     ],
 )
 def test_wrong_options_end_in_one_line(tmp_path, capsys, options, line):

@@ -60,6 +60,18 @@ def excitation(records: Sequence[Record]) -> list[str]:
     return []
 
 
+def too_short(found: Identified) -> list[str]:
+    """Of which recordings the fit took no segment, in a sentence."""
+    one, step = found.problem.segments[0], found.problem.step
+    least = len(one.before) + len(one.command)
+    rooms = [record.end - record.start for record in found.training if len(record.command) < least]
+    if not rooms:
+        return []
+    return [f'{sum(rooms):.3g} s in {len(rooms)} of {len(found.training)} stretches are used for '
+            f'the first guess only: each is shorter than {least * step:.3g} s, a segment with the '
+            'commands before it']  # fmt: skip
+
+
 def _in_one_line(signal: np.ndarray) -> float:
     """Share of the power of (n, 6) around the strongest frequency; 0 of too few periods of it."""
     total = (np.abs(np.fft.rfft(signal - signal.mean(axis=0), axis=0)) ** 2).sum(axis=1)

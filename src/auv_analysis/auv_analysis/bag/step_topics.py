@@ -177,9 +177,9 @@ class StepLayout:
     Attributes
     ----------
     size : bytes that a message has at least
-    strings : bytes up to here hold encapsulation, stamp and strings
-    shared : (strings,) 255 for each of these bytes that every message must share, else 0
-    like : these bytes
+    strings : bytes up to here, whole words, hold encapsulation, stamp and strings
+    shared : (strings / 8,) words whose bits are 1 where every message must have the same
+    like : words that hold these
     runs : place and count of float64 numbers that stand together
     order : permutation of these numbers into a row
     frames : ids in the strings; of a message without child frame, its one frame twice
@@ -221,7 +221,7 @@ class StepLayout:
         if np.any(sizes < self.size):
             return None
         head = gather(data, starts, self.strings)
-        sec, nanosec = head[:, STAMP].copy().view('<u4').astype(np.int64).T
+        sec, nanosec = head.view('<u4')[:, 1:3].astype(np.int64).T
         odd = (sec >= LATEST) | (nanosec >= interface.NANOSECONDS)
         if not self._alike(head) or np.any(odd):
             return None
@@ -234,7 +234,7 @@ class StepLayout:
         return (sec * interface.NANOSECONDS + nanosec, rows) if usable else None
 
     def _alike(self, heads: np.ndarray) -> bool:
-        return not np.any((heads ^ self.like) & self.shared)
+        return not np.any((heads.view(np.uint64) ^ self.like) & self.shared)
 
 
 def learned(message: bytes, role: str, decoder: Callable[[bytes], Any]) -> StepLayout | None:
@@ -269,7 +269,7 @@ def _layout(kind: str, message: bytes) -> StepLayout | None:
             return None
         shared += range(place, end)
         place = end
-    strings, place = place, _aligned(place, 8)
+    strings, place = -(-place // 8) * 8, _aligned(place, 8)
     if kind == ODOMETRY:  # position, quaternion x y z w, 36 covariances; twist, 36 covariances
         runs = [(place, 7), (place + 8 * (7 + 36), 6)]
         order, size = [0, 1, 2, 6, 3, 4, 5, *range(7, 13)], place + 8 * (7 + 36 + 6 + 36)
@@ -277,10 +277,11 @@ def _layout(kind: str, message: bytes) -> StepLayout | None:
         runs, order, size = [(place, 6)], list(range(6)), place + 8 * 6
     if size > len(message):
         return None
-    like = np.frombuffer(message, np.uint8, strings)
+    like = np.frombuffer(message, np.uint64, strings // 8)
     mask = np.zeros(strings, np.uint8)
     mask[shared] = 255
-    return StepLayout(size, strings, mask, like, runs, np.array(order), interface.Frames())
+    masks = mask.view(np.uint64)
+    return StepLayout(size, strings, masks, like, runs, np.array(order), interface.Frames())
 
 
 def _proven(

@@ -10,15 +10,18 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 from helpers.node_processes import PATIENCE, environment, fresh_domain
-from helpers.nodes_in_process import program
+from helpers.nodes_in_process import odometry, program
 from helpers.patience import patience
 from rclpy.duration import Duration
 from rclpy.service import Service
 
+from auv_analysis.nodes.analysis_node import AnalysisNode
 from auv_dynamics.ros import convert, node_interface, node_main, topics
 from auv_dynamics.ros.interface import PARENT
 from auv_dynamics.ros.node_main import BulkNode
+from auv_gvc_controller.nodes.setpoint_node import SetpointNode
 
 
 class Made(BulkNode):
@@ -82,6 +85,38 @@ def test_all_that_has_arrived_before_the_end_is_taken(monkeypatch, orphaned: boo
         guard.cancel()
         assert stop.is_set() != orphaned
         assert len(taken) == 30
+
+
+@pytest.mark.parametrize('lockstep', [True, False])
+@pytest.mark.parametrize(
+    ('kind', 'more'), [(SetpointNode, {}), (AnalysisNode, {'vehicle': 'rexrov'})]
+)
+def test_odometry_that_stays_away_is_told_in_real_time(
+    kind: type, more: dict[str, str], lockstep: bool
+) -> None:
+    with program() as made:
+        made.add(kind, {**more, 'lockstep': lockstep})
+        made.listen(topics.DIAGNOSTICS)
+        told = made.heard[topics.DIAGNOSTICS.name]
+
+        def health() -> tuple[bytes, str]:
+            return (told[-1].status[0].level, told[-1].status[0].message) if told else (b'', '')
+
+        silent, step = DiagnosticStatus.STALE, itertools.count()
+        for _ in range(2):  # also after it has come back
+            made.until(lambda: silent in health(), 'no odometry')
+
+            def goes_on() -> bool:
+                made.publish(topics.ODOM, odometry(next(step) * 10_000_000, [0, 0, 0, 1, *[0] * 9]))
+                return health() == (DiagnosticStatus.OK, 'ok')
+
+            made.until(goes_on, 'odometry')
+            if lockstep:
+                del told[:]
+                made.until(lambda: len(told) > 2, 'two seconds')
+                assert health() == (DiagnosticStatus.OK, 'ok'), 'there a pause is no fault'
+                return
+            made.until(lambda: health()[1].startswith('no odometry for '), 'silence')
 
 
 def test_in_lock_step_the_time_of_a_node_is_the_newest_that_is_simulated() -> None:

@@ -1,18 +1,15 @@
 """The set-point node: silent before the first odometry, ahead of it, and at an end."""
 
-import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticStatus
 from helpers.node_processes import Peer, assert_one_line, parameters, run_node
 from helpers.nodes_in_process import program
 from helpers.patience import patience
 from rcl_interfaces.srv import GetParameters
 
-from auv_analysis.nodes.analysis_node import AnalysisNode
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
 from auv_gvc_controller.nodes import setpoint_node
@@ -79,38 +76,6 @@ def test_runs_ahead_of_the_odometry_on_its_grid() -> None:
     assert np.allclose(surge, 0.2 + np.sin(2 * t), atol=1e-15)
     assert np.allclose(slope, 2 * np.cos(2 * t), atol=1e-15)
     assert peer.heard['cmd_vel'][0].header.frame_id == 'base_link_fsd'
-
-
-@pytest.mark.parametrize('lockstep', [True, False])
-@pytest.mark.parametrize(
-    ('kind', 'more'), [(SetpointNode, {}), (AnalysisNode, {'vehicle': 'rexrov'})]
-)
-def test_odometry_that_stays_away_is_told_in_real_time(
-    kind: type, more: dict[str, str], lockstep: bool
-) -> None:
-    with program() as made:
-        made.add(kind, {**more, 'lockstep': lockstep})
-        made.listen(topics.DIAGNOSTICS)
-        told = made.heard[topics.DIAGNOSTICS.name]
-
-        def health() -> tuple[bytes, str]:
-            return (told[-1].status[0].level, told[-1].status[0].message) if told else (b'', '')
-
-        silent, step = DiagnosticStatus.STALE, itertools.count()
-        for _ in range(2):  # also after it has come back
-            made.until(lambda: silent in health(), 'no odometry')
-
-            def goes_on() -> bool:
-                made.publish(topics.ODOM, odometry(next(step) * STEP))
-                return health() == (DiagnosticStatus.OK, 'ok')
-
-            made.until(goes_on, 'odometry')
-            if lockstep:
-                del told[:]
-                made.until(lambda: len(told) > 2, 'two seconds')
-                assert health() == (DiagnosticStatus.OK, 'ok'), 'there a pause is no fault'
-                return
-            made.until(lambda: health()[1].startswith('no odometry for '), 'silence')
 
 
 def test_without_a_horizon_the_next_odometry_finds_its_set_point() -> None:

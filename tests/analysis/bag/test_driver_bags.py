@@ -421,3 +421,38 @@ def test_the_namespace_of_the_recorder_is_the_one_that_is_read(tmp_path: Path, c
     for path, space in ((bag('/'), None), (told, '/auv4')):
         with pytest.raises(InputError, match=r'namespace /.*--namespace.*/auv1, /auv2, /auv3'):
             open_bag(path, namespace=space)
+
+
+def test_parameters_are_of_the_vehicle_that_is_read(tmp_path: Path) -> None:
+    """A file for two vehicles, and a bag of both whose recorder was that of the first."""
+    pid = '/auv2/controller_node:\n  ros__parameters: {law: pid, gains.k_P: [40.0], '
+    pid += 'gains.k_I: [2.0], gains.k_D: [0.5]}\n'
+
+    def bag(name: str, params: str) -> Path:
+        made = Bag(tmp_path / f'{name}.mcap')
+        texts = {'vehicle.yaml': VEHICLE, 'params.yaml': params, 'scenario.yaml': 'name: first\n'}
+        texts[RECORDING] = recording_text(False, {}, '/auv1')
+        for file, text in texts.items():
+            made.attach(file, text)
+        for ms, space in product(range(0, 50, 10), ('/auv1', '/auv2')):
+            odom, wrench = odometry(ms * MS, state(1)), stamped('Wrench', ms * MS, [1.0] * 6)
+            made.add(f'{space}/odom', ODOMETRY, ms * MS, serialized(odom))
+            made.add(f'{space}/wrench', wrench.__msgtype__, ms * MS, serialized(wrench))
+        return made.close()
+
+    both = bag('both', GVC.replace('**', 'auv1') + pid)
+    turned = bag('turned', pid + GVC.replace('**', 'auv1'))
+    recorders = bag('recorders', GVC + STEPS)
+    for path in (both, turned, bag('any', pid + GVC), bag('any_turned', GVC + pid), recorders):
+        run = load_run(path)
+        assert (run.law, run.scenario) == ('gvc', 'first')
+        assert not run.notes
+    for path in (both, turned):
+        assert load_run(path, namespace='auv2').gains == {'k_P': 40.0, 'k_I': 2.0, 'k_D': 0.5}
+    other = load_run(recorders, namespace='/auv2')
+    assert (other.law, other.gains, other.step) == ('unknown', {}, 0.01)
+    assert other.scenario == tmp_path.name
+    said = 'vehicle.yaml is of the vehicle in /auv1, whose recorder this was: --vehicle FILE names'
+    assert other.notes == (f'{said} that of /auv2',)
+    assert not load_run(recorders, 'rexrov', '/auv2').notes
+    assert load_run(recorders, namespace='/auv1/').law == 'gvc'

@@ -17,20 +17,31 @@ NAME = re.compile('[A-Za-z0-9][A-Za-z0-9_.+-]{0,99}')
 LAW = re.compile(r'[A-Za-z_][\w.]*:[A-Za-z_]\w*', re.ASCII)  # module:Class
 UNFIT = re.compile('[^A-Za-z0-9_.+-]+')
 UNKNOWN = 'unknown'  # law of a bag without params.yaml
+OWN = 2  # rank of parameters for the namespace; 1: for any, 0: for another
 
 
 def parameters_of(contents: BagContents, bag: Path) -> dict[str, dict[str, Any]]:
-    """Node name -> its parameters, from the attached parameter file."""
+    """Node name -> its parameters, from the attached parameter file.
+
+    Of several nodes of a name, that in the namespace which is read; where it is not the recorder's,
+    no other, since whatever names no namespace is of the recorder's vehicle.
+    """
     text = contents.attachments.get('params.yaml')
     if text is None:
         return {}
     file = f'{bag}: params.yaml'
     found: dict[str, dict[str, Any]] = {}
+    ranks: dict[str, int] = {}
+    own = (contents.namespace or '').strip('/')
     for name, entry in parse_yaml(text, file, 'parameter').items():
         values = entry.get('ros__parameters') if isinstance(entry, dict) else None
         if not isinstance(values, dict):
             raise InputError(file, name, 'a mapping with ros__parameters', entry)
-        found[name.rpartition('/')[2]] = values
+        space, _, node = name.rpartition('/')
+        space = space.strip('/')
+        rank = OWN if space == own else int(not space or '*' in space)
+        if rank >= ranks.get(node, OWN if contents.is_of_another else 0):
+            found[node], ranks[node] = values, rank
     return found
 
 
@@ -91,6 +102,9 @@ def vehicle_of(contents: BagContents, bag: Path, vehicle: str | Path | None) -> 
     text = contents.attachments.get('vehicle.yaml')
     if text is None:
         raise InputError(bag, 'vehicle.yaml', 'an attachment, or --vehicle FILE', None)
+    if contents.is_of_another:
+        told = f'vehicle.yaml is of the vehicle in {contents.recorder}, whose recorder this was'
+        contents.notes.append(f'{told}: --vehicle FILE names that of {contents.namespace}')
     file = f'{bag}: vehicle.yaml'
     return vehicle_from_dict(parse_yaml(text, file, 'vehicle'), file)
 

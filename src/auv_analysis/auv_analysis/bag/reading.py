@@ -167,6 +167,7 @@ class BagContents(FileExtent):
     names : recorded topic -> our name of it, where the recorder's topics were remapped
     namespace : that is read: the one asked for, else that of the recorder; None: any
     asked : whether it was asked for
+    recorder : namespace of the recorder, which the attachments are of; None: the bag does not say
     strict : whether every step had to come once and in order; where it had not, a driver was free
         to say anything, and what cannot be used is left out; None: the bag does not say
 
@@ -181,7 +182,15 @@ class BagContents(FileExtent):
     names: dict[str, str] = field(default_factory=dict)
     namespace: str | None = None
     asked: bool = False
+    recorder: str | None = None
     strict: bool | None = None
+
+    @property
+    def is_of_another(self) -> bool:
+        """Whether the vehicle that is read is not the recorder's."""
+        if self.namespace is None or self.recorder is None:
+            return False
+        return self.namespace.strip('/') != self.recorder.strip('/')
 
 
 class FileReader:
@@ -238,7 +247,7 @@ class FileReader:
         kept[item.name] = text
         if item.name == RECORDING:
             strict, self._contents.names, namespace = read_recording(text, self._path)
-            self._contents.strict = strict
+            self._contents.strict, self._contents.recorder = strict, namespace
             if not self._contents.asked:
                 self._contents.namespace = namespace
 
@@ -405,6 +414,8 @@ def read_bag(
             pair = columns.setdefault(topic, (SpooledColumn(whole), SpooledColumn(whole)))
             for column, rows in zip(pair, series, strict=True):
                 column.append(rows)
+    if contents.is_of_another:
+        contents.attachments.pop('scenario.yaml', None)
     for topic in [*columns]:  # one topic after the other, so that little is held twice
         stamps, values = columns.pop(topic)
         contents.messages[topic] = stamps.array(), values.array()

@@ -364,6 +364,13 @@ def test_combined_derivatives_of_a_list_come_out_as_published(imported):
     assert_array_equal(alone.lift[5], [0, 24, 0, 0, 0, 2])
 
 
+def test_a_block_of_comments_and_dollars_of_a_list_are_no_numbers(imported):
+    text = BLUEROV2 + '%{\nYp = 3\n%}\n$Y_{\\dot p}$ = -0.3; $K_{\\dot v}$ = -0.3\n'
+    vehicle, _ = imported('a.m', text, *LIST)
+    assert vehicle.D_linear[1, 3] == 0
+    assert vehicle.M_A[1, 3] == vehicle.M_A[3, 1] == 0.3
+
+
 def test_damping_by_forward_speed_of_uuv_simulator_is_lift(imported):
     row = ' '.join(str(-value) for value in (0, 0, 0, 0, 0, 9))
     matrix = f'{"0 0 0 0 0 0 " * 5}{row}'
@@ -446,6 +453,11 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
     'two buoyancies': (
         'a.m', BLUEROV2 + 'V = 0.0114; rho = 1000', LIST, 'B: expected rho g V = 111.8'),
     'two values by two names': ('a.m', BLUEROV2 + 'mass = 12', LIST, 'mass: expected 11.5 as by'),
+    'one place by two names': (
+        'a.m', BLUEROV2 + 'X_uu = -99', LIST, 'X_uu: expected -18.18 as by another name'),
+    'a minus before a name': ('a.m', BLUEROV2 + '-Yp = 0.3', LIST, 'Yp: expected a number'),
+    'a row of words': ('a.m', BLUEROV2 + 'Yrdot  -1.93', LIST, 'Yrdot: expected Yrdot = a'),
+    'a row of a table': ('a.m', BLUEROV2 + '| Yp | -1.93 |', LIST, 'Yp: expected Yp = a number'),
     'nondimensional': ('a.m', BLUEROV2 + "Xvv' = 0.01", [], 'a prime'),
     'a letter for a digit': ('a.m', BLUEROV2.replace('Mq = -0.07', 'Mq = -6O'), LIST, 'Mq'),
     'a product': ('a.m', BLUEROV2.replace('Mq = -0.07', 'Mq = -6*10'), LIST, 'Mq'),

@@ -21,9 +21,12 @@ SI = rf'{PART}(?:[ ./*^·()\-\d²³]*{PART})*[\^()\-\d²³]*'
 UNIT = rf'(?:\[\s*(?:{SI}|[-1])?\s*\]|\((?!(?:mm|cm|km|g|lb|deg)\b)[^)]*\)|{SI})'
 FOLLOWS = re.compile(rf"\s*{UNIT}?\s*(?:$|[;,&|\\](?!\d)|(?=[A-Za-z][\w{{}}|\\']*\s*[=:]))")
 BRACED = re.compile(r'\{[^=]*\}')  # X_{\dot u}
+BLOCK = re.compile(r'^[ \t]*%\{[ \t]*$.*?^[ \t]*%\}[ \t]*$', re.M | re.S)  # of comments
 COMMENT = re.compile(r'(%|#|//).*')
 ADDED = re.compile(r'([XYZKMN])(?:([uvwpqr])dot|dot([uvwpqr]))')
 DAMPING = re.compile(r'([XYZKMN])([uvwpqr])([uvwpqr])?')
+NAME = r'(?:[XYZKMN](?:[uvwpqr]{1,2}|[uvwpqr]dot|dot[uvwpqr])|I[xyz]{1,2}|[xyz][GBgb]|rho)'
+UNREAD = re.compile(rf'(?<![\w.])({NAME})[\s&|]+{NUMBER}')  # a row of a table
 SURFACE = re.compile(r'[XYZKMN]uu(?:d|delta)[a-z]*')  # Yuudr: an input
 ABSOLUTE = re.compile(r'abs([uvwpqr])')
 ROWS, COLUMNS = 'XYZKMN', 'uvwpqr'
@@ -91,11 +94,15 @@ def _lift(draft: ImportedVehicle, derivatives: np.ndarray, names: list[str]) -> 
 
 def _assignments(text: str, draft: ImportedVehicle) -> list[tuple[str, float]]:
     found, seen = [], set()
-    for line in text.splitlines():
-        bare = BRACED.sub(lambda braced: braced[0].replace(' ', ''), COMMENT.sub('', line))
+    for line in BLOCK.sub('', text).splitlines():
+        bare = COMMENT.sub('', line).replace('$', '')
+        bare = BRACED.sub(lambda braced: braced[0].replace(' ', ''), bare)
+        if unread := UNREAD.search(re.sub(r'[_{}\\]', '', bare)):
+            raise draft.refuse(unread[1], f'{unread[1]} = a number', line.strip())
         for match in ASSIGNED.finditer(bare):
             name = match[1]
             told = match[2] is not None and abs(float(match[2])) <= LARGEST
+            told = told and not bare[: match.start()].rstrip().endswith(('-', '\N{MINUS SIGN}'))
             if not told or not FOLLOWS.match(bare, match.end()):
                 expected = 'a number, and nothing behind it but its SI unit'
                 raise draft.refuse(name, expected, line.strip())
@@ -111,28 +118,34 @@ def _placed(
 ) -> bool:
     """Put a coefficient in its matrix; False where its name is none."""
     added, linear, quadratic, lift = matrices
+
+    def put(A: np.ndarray, i: int, j: int) -> None:
+        if A[i, j] and A[i, j] != value:
+            raise draft.refuse(name, f'{A[i, j]:g} as by another name', value)
+        A[i, j] = value
+
     if match := ADDED.fullmatch(plain):
-        added[ROWS.index(match[1]), COLUMNS.index(match[2] or match[3])] = value
+        put(added, ROWS.index(match[1]), COLUMNS.index(match[2] or match[3]))
         return True
     match = DAMPING.fullmatch(plain)
     if match is None:
         return False
     i, j = ROWS.index(match[1]), COLUMNS.index(match[2])
     if match[3] is None:
-        linear[i, j] = value
+        put(linear, i, j)
     elif _is_by_u(plain):
         other = match[3] if match[2] == 'u' else match[2]
         if value and f'|{other}|' in ABSOLUTE.sub(r'|\1|', name):
             draft.cannot_hold(name, 'u times the absolute value of another velocity')
         else:
-            lift[i, COLUMNS.index(other)] = value
+            put(lift, i, COLUMNS.index(other))
     elif match[3] != match[2]:
         if value:
             draft.cannot_hold(name, 'a product of two different velocities')
     else:
         if '|' not in name and 'abs' not in name and value:
             draft.assumed.append(f'{name}: multiplies the velocity and its absolute value')
-        quadratic[i, j] = value
+        put(quadratic, i, j)
     return True
 
 

@@ -168,6 +168,13 @@ def test_water_of_the_world_comes_before_that_of_the_plugin(imported):
     assert imported('one.sdf', alone)[0].buoyancy == pytest.approx(1.025 * 98.1)
 
 
+def test_water_of_a_world_with_graded_buoyancy_is_its_default(imported):
+    text = sdf(more='<water_density>1000</water_density>')
+    graded = '<graded_buoyancy><default_density>1025</default_density></graded_buoyancy>'
+    text = re.sub('<uniform.*density>', graded, text)
+    assert imported('graded.sdf', text)[0].buoyancy == pytest.approx(1.025 * 98.1)
+
+
 def test_prefixes_that_nobody_declares(imported):
     more = '<experimental:params><add name="a" gz:name="b"/></experimental:params>'
     text = sdf().replace('<model name="made">', f'<model name="made">{more}')
@@ -458,6 +465,9 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
     'a minus before a name': ('a.m', BLUEROV2 + '-Yp = 0.3', LIST, 'Yp: expected a number'),
     'a row of words': ('a.m', BLUEROV2 + 'Yrdot  -1.93', LIST, 'Yrdot: expected Yrdot = a'),
     'a row of a table': ('a.m', BLUEROV2 + '| Yp | -1.93 |', LIST, 'Yp: expected Yp = a number'),
+    'coefficients of a shape': ('a.yaml', f'{REXROV}type: box\n', [], 'type: expected fossen'),
+    'numbers that do not count': (
+        'a.sdf', sdf().replace('<inertial>', '<inertial auto="true">'), [], 'link.inertial.auto'),
     'nondimensional': ('a.m', BLUEROV2 + "Xvv' = 0.01", [], 'a prime'),
     'a letter for a digit': ('a.m', BLUEROV2.replace('Mq = -0.07', 'Mq = -6O'), LIST, 'Mq'),
     'a product': ('a.m', BLUEROV2.replace('Mq = -0.07', 'Mq = -6*10'), LIST, 'Mq'),

@@ -81,7 +81,8 @@ def _link(
 
 
 def _density(root: Element, plugin: Element, draft: ImportedVehicle) -> tuple[float, str] | None:
-    for element, key in ((root.find('.//uniform_fluid_density'), 'uniform_fluid_density'),
+    world = ('uniform_fluid_density', 'graded_buoyancy/default_density')
+    for element, key in (*((root.find(f'.//{key}'), key) for key in world),
                          (plugin.find('water_density'), 'water_density')):  # fmt: skip
         if element is not None:
             return numbers(element.text, 1, draft.file, key)[0], f'<{key}>'

@@ -21,6 +21,7 @@ ALIASES = {
     'cob': 'center_of_buoyancy', 'density': 'fluid_density', 'inertia': 'inertial',
 }  # fmt: skip
 OTHERS = {'model', 'type', 'base_link', 'length', 'width', 'height', 'box', 'name', 'model_name'}
+SHAPES = {'sphere', 'cylinder', 'spheroid', 'box'}
 NEUTRAL = {  # scalings and offsets that change nothing
     'scaling_added_mass': 1.0, 'scaling_damping': 1.0, 'scaling_volume': 1.0,
     'offset_added_mass': 0.0, 'offset_linear_damping': 0.0, 'offset_volume': 0.0,
@@ -64,6 +65,8 @@ def _gathered(data: Mapping[str, Any], draft: ImportedVehicle) -> dict[str, Any]
         if name in NEUTRAL:
             if _numbers(draft, {key: value}, key, 1)[0] != NEUTRAL[name]:
                 raise draft.refuse(key, f'{NEUTRAL[name]:g}', value)
+        elif name == 'type' and str(value).strip().lower() in SHAPES:
+            raise draft.refuse(key, 'fossen: of a shape its coefficients are computed', value)
         elif name in KNOWN:
             if name in found:
                 raise draft.refuse(key, 'each entry once', 'again')

@@ -186,6 +186,9 @@ def link_inertia(draft: ImportedVehicle, link: Element, model: Element) -> None:
     if inertial is None or inertial.find('mass') is None:
         raise draft.refuse('link.inertial.mass', 'a number (kg)', None)
     path, key = draft.file, 'link.inertial'
+    if inertial.get('auto') in ('true', '1'):
+        expected = 'numbers that count, and no auto: Gazebo takes those of the collision shapes'
+        raise draft.refuse(f'{key}.auto', expected, inertial.get('auto'))
     mass = numbers(inertial.findtext('mass'), 1, path, f'{key}.mass')[0]
     r_G, R = pose_in_link(inertial, link, model, path, key)
     entries = [

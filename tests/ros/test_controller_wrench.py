@@ -74,14 +74,15 @@ def controller(made: Program, vehicle: Path, law: str, **settings: Any) -> Contr
     return node
 
 
-def offered(made: Program, k: int) -> None:
-    """Set-point, acceleration and odometry of step k; the answer has come."""
+def offered(made: Program, k: int, waited_for: Callable[[], Any] = lambda: None) -> None:
+    """Set-point, acceleration and odometry of step k; `waited_for` is done; the answer has come."""
     rotation = reference.jacobian(ETA[k])[:3, :3]
     state = [*ETA[k, :3], *quaternion_of(rotation), *NU[k]]
     for topic, row in ((topics.CMD_VEL, NU_D[k]), (topics.CMD_ACCEL, NU_D_DOT[k])):
         made.publish(topic, by_hand.six(topic.type, k * STEP, row))
     count = len(made.heard['wrench'])
     made.publish(topics.ODOM, by_hand.odometry(k * STEP, state))
+    waited_for()
     made.until(lambda: len(made.heard['disturbance_estimate']) > count, f'answer {k}')
     made.until(lambda: len(made.heard['wrench']) > count, f'wrench {k}')
 
@@ -159,6 +160,27 @@ def test_a_law_that_is_changed_while_inactive_is_taken(made, vehicle) -> None:
     answers_as(made, 'cl', PER_AXIS, STEPS)
     change(node, law='gvc', gains__k_D=[7.0])
     answers_as(made, 'gvc', PER_AXIS | {'k_D': [7.0]}, 2 * STEPS)
+
+
+def test_in_lock_step_odometry_of_an_inactive_one_is_answered_once_it_is_active(made, vehicle):
+    """The plant publishes it once and waits: a change of gains in a run ended it."""
+    node = controller(made, vehicle, 'gvc')
+    answers_as(made, 'gvc', PER_AXIS, 0)
+
+    def change_once_it_came() -> None:
+        made.until(lambda: node._missed, 'the odometry')
+        made.spin(0.1)
+        assert len(made.heard['wrench']) == STEPS, 'inactive, it says nothing'
+        assert node.set_parameters([Parameter('gains.k_D', value=[7.0])])[0].successful
+        assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
+
+    assert node.trigger_deactivate() == TransitionCallbackReturn.SUCCESS
+    offered(made, STEPS, change_once_it_came)
+    change(node, gains__k_D=[7.0])
+    ((tau, _),) = expected('gvc', PER_AXIS | {'k_D': [7.0]}, STEPS, 1)
+    assert_allclose(by_hand.six_of(made.heard['wrench'][-1]), tau, rtol=1e-9)
+    answers_as(made, 'gvc', PER_AXIS | {'k_D': [7.0]}, STEPS + 1)
+    assert len(made.heard['wrench']) == 2 * STEPS + 1, 'and that once'
 
 
 def test_limits_that_are_changed_while_inactive_are_taken(made, vehicle) -> None:

@@ -240,6 +240,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         self._controller: VelocityController  # exists once configured
         self._active = False
         self._held: tuple[Answer, bool] | None = None  # and whether the controller leaves with it
+        self._missed: tuple[int, tuple[float, ...]] | None = None  # odometry of an inactive one
         self._follows = False
         self._publish_wrench = self.graph.output(topics.WRENCH)
         self._publish_estimate = self.graph.output(topics.DISTURBANCE_ESTIMATE)
@@ -278,10 +279,19 @@ class ControllerNode(BulkMixin, LifecycleNode):
         return SUCCESS if self._build() else FAILURE
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Start from zero integrals with the parameters of this moment."""
+        """Start from zero integrals with the parameters of this moment.
+
+        In lock-step a plant waits for the answer to an odometry that came before.
+        """
         if not self._build():
             return FAILURE
         self._active = True
+        missed, self._missed = self._missed, None
+        if missed is not None and self._settings.lockstep:
+            try:
+                self._on_odometry(*missed)
+            except ValueError as error:
+                self.graph.refuse(f'{topics.ODOM.name}: {error}')
         return SUCCESS
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -314,6 +324,8 @@ class ControllerNode(BulkMixin, LifecycleNode):
     def _on_odometry(self, ns: int, x: tuple[float, ...]) -> None:
         if self._active:
             self._say(self._controller.odometry(ns, x, self._now()))
+        else:
+            self._missed = ns, x
 
     def _now(self) -> Now:
         if self._settings.lockstep:

@@ -1,7 +1,7 @@
 """The zero-order hold: z += dt e_{k-1}, S += dt s_{k-1}, nothing at k = 0, then tau_k."""
 
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import herman_reference as reference
 import numpy as np
@@ -133,15 +133,50 @@ class Own(NamedTuple):
     k: float
 
 
+class Short(NamedTuple):
+    """Gains of a law whose answers change their shape after half a second."""
+
+    STATES = 2
+
+    wrenches: Any
+    rates: Any
+
+    @staticmethod
+    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        return gains.wrenches if t > 0.5 else ((0.0,) * 6, (0.0,) * 6)
+
+    @staticmethod
+    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        return gains.rates if t > 0.5 else (0.0, 0.0)
+
+
 @pytest.mark.parametrize(
-    ('raised', 'error', 'text'),
+    ('tau', 'f', 'rates', 'text'),
     [
-        (KeyError('k_Q'), ArithmeticError, "the law Own failed: KeyError: 'k_Q'"),
-        (OverflowError('too large'), OverflowError, 'too large'),
+        (np.zeros(7), np.zeros(6), (0, 0), 'expected 6 numbers as tau, found 7'),
+        (np.zeros(6), np.zeros(5), (0, 0), 'expected 6 numbers as f, found 5'),
+        (np.zeros((3, 2)), np.zeros(6), (0, 0), 'TypeError'),
+        (np.zeros(6), np.zeros(6), (0, 0, 0), 'expected 2 numbers as state_rate, found 3'),
+        (np.zeros(6), np.zeros(6), (0,), 'expected 2 numbers as state_rate, found 1'),
     ],
 )
-def test_what_a_law_of_ones_own_raises_names_it(raised, error, text):
-    with pytest.raises(error, match=re.escape(text)), user_law(Own(1.0)):
+def test_answers_of_another_size_are_refused_by_the_name_of_the_law(tau, f, rates, text):
+    one = SampledLaw(Short((tau, f), rates), control_model(load_vehicle('rexrov')))
+    zero = (0.0,) * 6
+    one.sample(0.0, 0.0, zero, ATTITUDE, zero, zero)
+    with pytest.raises(ArithmeticError, match=f'the law Short failed: .*{text}'):
+        one.sample(1.0, 1.0, zero, ATTITUDE, zero, zero)
+
+
+@pytest.mark.parametrize(
+    ('raised', 'text'),
+    [
+        (KeyError('k_Q'), "the law Own failed: KeyError: 'k_Q'"),
+        (OverflowError('too large'), 'the law Own failed: OverflowError: too large'),
+    ],
+)
+def test_what_a_law_of_ones_own_raises_names_it(raised, text):
+    with pytest.raises(ArithmeticError, match=re.escape(text)), user_law(Own(1.0)):
         raise raised
     with pytest.raises(KeyError), user_law(make_gains('cl', PAPER)):
         raise KeyError('a defect of ours stays what it is')

@@ -28,7 +28,7 @@ from auv_dynamics.plant.actuators import memory
 from auv_dynamics.plant.devices import WIDTH, SensorNoise, history_shape
 from auv_dynamics.plant.faults import FaultRows
 from auv_dynamics.plant.plant import SIZE, Plant, initial_state, unwrapped_eta
-from auv_gvc_controller.control.sampled import SampledLaw, anti_windup, is_compiled, user_law
+from auv_gvc_controller.control.sampled import SampledLaw, anti_windup, is_compiled
 from auv_gvc_controller.control.setpoint import Setpoint
 from auv_gvc_controller.laws.model import control_model
 
@@ -138,7 +138,7 @@ def _run_kernel(
     nu_d_dot, vehicle = np.empty((scenario.steps + 1, 6)), with_batch_axis(loop)
     for grid, known in each(blocks(scenario), scenario.steps // BLOCK + 1):
         nu_d_dot[grid.first : grid.first + len(grid.t)] = known.reference[:, 0, 6:]
-        with np.errstate(all='ignore'), user_law(gains):
+        with np.errstate(all='ignore'):
             tables_of = with_batch_axis(known)
             run(vehicle, tables_of, grid, tableau, motion, work, kept, 0, 1, None)
     return nu_d_dot

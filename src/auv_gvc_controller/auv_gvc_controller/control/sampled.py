@@ -33,9 +33,10 @@ def wrench(
     t: float, nu: Vector, attitude: Vector, nu_d: Vector, nu_d_dot: Vector, state: Vector,
     gains: Any, model: ControlModel,
 ) -> tuple[Numbers, Numbers]:  # fmt: skip
-    """(tau, f) of the law to which `gains` belongs."""
-    tau, f = type(gains).wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
-    return tuple(map(float, tau)), tuple(map(float, f))
+    """(tau, f) of the law to which `gains` belongs; ArithmeticError if it does not give them."""
+    with user_law(gains):
+        tau, f = type(gains).wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
+        return _numbers('tau', tau, 6), _numbers('f', f, 6)
 
 
 @specialised('gains')
@@ -43,8 +44,30 @@ def state_rate(
     t: float, nu: Vector, attitude: Vector, nu_d: Vector, nu_d_dot: Vector, state: Vector,
     gains: Any, model: ControlModel,
 ) -> Vector:  # fmt: skip
-    """Rate of the state of the law to which `gains` belongs."""
-    return type(gains).state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
+    """Rate of the state of the law to which `gains` belongs; ArithmeticError as of `wrench`."""
+    law = type(gains)
+    with user_law(gains):
+        rate = law.state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
+        return _numbers('state_rate', rate, law.STATES)
+
+
+def _numbers(name: str, values: Any, count: int) -> Numbers:
+    found = tuple(map(float, values))
+    if len(found) != count:
+        raise ValueError(f'expected {count} numbers as {name}, found {len(found)}')
+    return found
+
+
+@contextmanager
+def user_law(gains: Any) -> Iterator[None]:
+    """Turn what a user's law raises while it runs into an ArithmeticError that names it."""
+    try:
+        yield
+    except Exception as error:
+        if type(gains) in SHIPPED.values():
+            raise
+        said = named_line(error)
+        raise ArithmeticError(f'the law {type(gains).__name__} failed: {said}') from error
 
 
 class AntiWindup(NamedTuple):
@@ -141,20 +164,6 @@ def is_compiled(gains: Any) -> bool:
     return JITTED and type(gains) in SHIPPED.values()
 
 
-@contextmanager
-def user_law(gains: Any) -> Iterator[None]:
-    """Turn what a user's law raises while it runs into an ArithmeticError that names it."""
-    try:
-        yield
-    except ArithmeticError:
-        raise
-    except Exception as error:
-        if type(gains) in SHIPPED.values():
-            raise
-        said = named_line(error)
-        raise ArithmeticError(f'the law {type(gains).__name__} failed: {said}') from error
-
-
 ZERO = (0.0,) * 6
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
@@ -225,7 +234,7 @@ class SampledLaw:
         if self._compiled:  # nothing of Python's to catch, and it is called at every step
             tau, f = self._sample(*given, *known)
         else:
-            with np.errstate(all='ignore'), user_law(self._gains):
+            with np.errstate(all='ignore'):
                 tau, f = self._sample(*given, *known)
         if not all(map(math.isfinite, (*tau, *f, *state.tolist(), *rate.tolist()))):
             raise ArithmeticError(f'the law gave a wrench that is not finite: {tau}')

@@ -119,10 +119,10 @@ def try_law(gains: Any, model: Any) -> None:
             text = f'expected {part} of {law.__name__} to answer at rest, found {named_line(error)}'
             raise ValueError(text) from None
 
-    answer = call('wrench', lambda: [np.asarray(a, float).size for a in law.wrench(*arguments)])
-    _expect(law, 'wrench', 'tau and f, 6 numbers each', answer, [6, 6])
-    rates = call('state_rate', lambda: np.asarray(law.state_rate(*arguments), float).size)
-    _expect(law, 'state_rate', f'{law.STATES} numbers', rates, law.STATES)
+    answer = call('wrench', lambda: [np.asarray(a, float).shape for a in law.wrench(*arguments)])
+    _expect(law, 'wrench', 'tau and f, 6 numbers each', answer, [(6,), (6,)])
+    rates = call('state_rate', lambda: np.asarray(law.state_rate(*arguments), float).shape)
+    _expect(law, 'state_rate', f'{law.STATES} numbers', rates, (law.STATES,))
     if hasattr(law, 'body_gains'):
         gained = call('body_gains', lambda: np.asarray(law.body_gains(gains, model), float))
         good = gained.size == 72 and bool(np.isfinite(gained).all())

@@ -20,7 +20,6 @@ from auv_gvc_controller.control.sampled import (
     compiled_sample,
     fill_sample,
     is_compiled,
-    user_law,
 )
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import ControlModel, control_model
@@ -237,15 +236,14 @@ class LawAt:
         """(K, 6 + m) of (K, 20 + m): tau in N, N m, then rates of the law's m states, at t = 0."""
         m = self.states
         found = np.zeros((len(points), 6 + m))
-        with user_law(self._gains):
-            states = points[:, 8 : 8 + m].copy()
-            for answer, state, y in zip(found, states, points.tolist(), strict=True):
-                # a sample after no time at all: nothing is integrated
-                tau, _ = self._sample(
-                    0.0, 0.0, tuple(y[2:8]), self._attitude(y[0], y[1]), tuple(y[8 + m : 14 + m]),
-                    tuple(y[14 + m :]), state, answer[6:], self._gains, self._model, self._guard,
-                )  # fmt: skip
-                answer[:6] = tau
+        states = points[:, 8 : 8 + m].copy()
+        for answer, state, y in zip(found, states, points.tolist(), strict=True):
+            # a sample after no time at all: nothing is integrated
+            tau, _ = self._sample(
+                0.0, 0.0, tuple(y[2:8]), self._attitude(y[0], y[1]), tuple(y[8 + m : 14 + m]),
+                tuple(y[14 + m :]), state, answer[6:], self._gains, self._model, self._guard,
+            )  # fmt: skip
+            answer[:6] = tau
         if not np.isfinite(found).all():
             wrong = found[~np.isfinite(found).all(axis=1)][0]
             raise ArithmeticError(f'the law gave what is not finite: {wrong}')

@@ -1,5 +1,6 @@
 """The notebooks run from their first cell to their last, and are kept without what they print."""
 
+import ast
 import json
 import shutil
 import sys
@@ -21,6 +22,16 @@ def test_kept_without_outputs(path: Path) -> None:
     for cell in cells:
         assert cell['outputs'] == []
         assert cell['execution_count'] is None
+
+
+@pytest.mark.parametrize('path', NOTEBOOKS, ids=lambda path: path.stem)
+def test_takes_only_names_that_exist(path: Path) -> None:
+    """Each is run by `make docs` alone, and would be found broken late."""
+    cells = [cell for cell in json.loads(path.read_text())['cells'] if cell['cell_type'] == 'code']
+    nodes = [node for cell in cells for node in ast.walk(ast.parse(''.join(cell['source'])))]
+    taken = [ast.unparse(node) for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+    assert taken
+    exec('\n'.join(taken), {})
 
 
 @pytest.mark.long

@@ -138,8 +138,13 @@ def _have_own_stamps(series: Mapping[str, Series]) -> bool:
     """Whether set-points came at other times than the odometry between them, on its clock."""
     odometry, _ = series[interface.ODOM]
     stamps, _ = series.get(interface.CMD_VEL, series[interface.ODOM])
-    between = odometry[(odometry >= stamps.min()) & (odometry <= stamps.max())]
-    return len(between) > 0 and bool(np.isin(between, stamps).mean() < PAIRED)
+    stamps, met, count = stamps if _is_rising(stamps) else np.sort(stamps), 0, 0
+    for here in slices(len(odometry)):
+        ns = rows_of(odometry, here)
+        between = ns[(ns >= stamps[0]) & (ns <= stamps[-1])]
+        met += int((stamps[np.searchsorted(stamps, between)] == between).sum())
+        count += len(between)
+    return met < PAIRED * count
 
 
 def _dropped(role: str, stamps: np.ndarray, kept: int) -> list[str]:
@@ -187,7 +192,7 @@ def _run(ns: np.ndarray, values: dict[str, np.ndarray], facts: dict[str, Any], w
     """Run of complete steps; nu_d is NaN where not recorded, nu_d_dot then the slope of nu_d."""
     x = values.get(interface.GROUND_TRUTH, values[interface.ODOM])
     t = ((rows_of(ns, here) - ns[0]) / interface.NANOSECONDS for here in slices(len(ns)))
-    zeros, unknown = np.zeros((len(ns), 6)), np.broadcast_to(np.nan, (len(ns), 6))
+    zeros, unknown = (np.broadcast_to(value, (len(ns), 6)) for value in (0.0, np.nan))
     nu_d, nu_d_dot = values.get(interface.CMD_VEL, unknown), values.get(interface.CMD_ACCEL)
     if nu_d_dot is None:
         nu_d_dot = gathered(_slopes(nu_d, facts['step']), whole)

@@ -100,7 +100,7 @@ def gathered(blocks: Iterable[np.ndarray], whole: float) -> np.ndarray:
     return column.array()
 
 
-def slices(count: int, rows: int = 1 << 16) -> Iterator[slice]:
+def slices(count: int, rows: int = 1 << 13) -> Iterator[slice]:
     """Slices of so many rows that make up a count of them."""
     return (slice(i, min(i + rows, count)) for i in range(0, count, rows))
 
@@ -148,8 +148,8 @@ def usual_limit(ns: np.ndarray) -> float:
     """Longest pause that is no gap, by the intervals of rising stamps (n,), ns."""
     if len(ns) < 2:
         return np.inf
-    apart = np.diff(ns)
-    return float(max(GAP_PERIODS * np.median(apart), GAP_USUAL * np.percentile(apart, USUAL)))
+    median, usual = np.percentile(np.diff(ns), (50, USUAL), overwrite_input=True)
+    return float(max(GAP_PERIODS * median, GAP_USUAL * usual))
 
 
 @dataclass

@@ -166,6 +166,10 @@ def _facts(
     step = attachments.step_of(parameters, bag)
     law, gains = attachments.law_and_gains(parameters.get('controller_node', {}), bag)
     known = attachments.vehicle_of(contents, bag, vehicle)
+    gaps = _gaps(ns)
+    if lost := sum(end - begin for begin, end in gaps):
+        counted = f'{len(gaps)} gap{"s" * (len(gaps) > 1)}'
+        notes = [*notes, f'no samples in {counted}, {lost:.6g} s together']
     return {
         'vehicle': known,
         'scenario': attachments.scenario_name(contents, bag),
@@ -176,7 +180,7 @@ def _facts(
         'source': 'bag',
         'kinds': attachments.kinds_of(contents, bag),
         'faults': attachments.faults_of(contents, known),
-        'gaps': () if contents.strict else _gaps(ns),
+        'gaps': gaps,
         'notes': (*contents.notes, *attachments.notes_on(law), *notes),
     }
 

@@ -33,6 +33,12 @@ def test_parameters_are_those_of_nodes_whatever_their_namespaces() -> None:
     found = attachments.parameters_of(contents(params=told), BAG)
     assert found == {'plant_node': {'step': 0.01}, 'controller_node': {'law': 'gvc'},
                      'recorder_node': {}}  # fmt: skip
+    nested = {'/sea': {'auv1': {'controller_node': {'ros__parameters': {'law': 'gvc'}}}},
+              'auv2': {'controller_node': {'ros__parameters': {'law': 'cl'}}}}  # fmt: skip
+    for space, law in (('/sea/auv1', 'gvc'), ('/auv2', 'cl')):
+        bag = contents(params=nested)
+        bag.namespace = space
+        assert attachments.parameters_of(bag, BAG) == {'controller_node': {'law': law}}
     assert attachments.parameters_of(BagContents(), BAG) == {}
     for wrong in ({'plant_node': 7}, {'plant_node': {'step': 0.01}}):
         with pytest.raises(InputError, match=r'params.yaml: plant_node: expected a mapping with'):
@@ -93,6 +99,19 @@ def test_faults_are_those_of_a_scenario_that_is_one() -> None:
     assert attachments.faults_of(BagContents(), vehicle) == ()
     wrong = yaml.safe_load(text) | {'duration': 'long'}
     assert attachments.faults_of(contents(scenario=wrong), vehicle) == ()
+
+
+@pytest.mark.parametrize(('told', 'kind', 'topic'), [
+    ({'sensors': {}}, 'sensor_bias', 'ground_truth/odom'),
+    ({'actuators': {}}, 'wrench_loss', 'wrench_applied'),
+])  # fmt: skip
+def test_what_counts_for_a_topic_that_is_missing_is_said(told, kind, topic) -> None:
+    by_scenario = attachments.notes_on_missing(contents(scenario=told), set(), {'odom'})
+    by_fault = attachments.notes_on_missing(BagContents(), {kind}, {'odom'})
+    assert [note.partition(':')[0] for note in by_scenario] == [topic]
+    assert by_fault == by_scenario
+    assert attachments.notes_on_missing(contents(scenario=told), {kind}, {topic}) == []
+    assert attachments.notes_on_missing(contents(scenario={}), set(), {'odom'}) == []
 
 
 def test_kinds_of_disturbances_are_known_where_a_scenario_is() -> None:

@@ -3,6 +3,7 @@
 import mmap
 import tempfile
 import tracemalloc
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -131,6 +132,21 @@ def test_each_topic_is_a_part_of_the_run_and_attachments_name_it(tmp_path) -> No
         np.testing.assert_array_equal(getattr(run, part), rows[role], err_msg=part)
     np.testing.assert_array_equal(run.eta[:, 0], 6e3 + np.arange(4))
     assert (run.scenario, run.controller, run.vehicle.name) == ('dive', 'cl', 'rexrov')
+
+
+def test_without_f_nothing_is_said_of_its_error(tmp_path) -> None:
+    bag = Bag(tmp_path / 'bag.mcap')
+    bag.attach('vehicle.yaml', VEHICLE)
+    roles = {'odom': '', 'wrench': 'Wrench', 'disturbance': 'Wrench'}
+    for k, (role, name) in product(range(4), roles.items()):
+        made = stamped(name, k * STEP, [5.0] * 6) if name else odometry(k * STEP, turning(k))
+        bag.add(f'/{role}', made.__msgtype__, k * STEP, serialized(made))
+    run = load_run(bag.close(), vehicle='rexrov')
+    assert np.isnan(run.disturbance_estimate).all()
+    assert not run.knows_disturbance
+    assert summarize(run)['lumped_error'] == {'rms': None, 'max_after_2s': None}
+    assert run.notes == ('disturbance_estimate: no messages: f is unknown, F not used',)
+    assert not digest(run).estimates
 
 
 def test_a_step_that_nobody_says_is_the_usual_one(tmp_path) -> None:

@@ -272,6 +272,16 @@ def test_odometry_that_only_the_controller_heard_is_counted(tmp_path: Path) -> N
     assert len(found.ns) == COUNT - len(lost) - 1, 'the first wrench of this bag is zero'
 
 
+def test_odometry_outside_of_the_bag_is_not_said_to_be_integrated_over(tmp_path: Path) -> None:
+    lost = *range(5), COUNT - 1
+    loop = recorded_loop(write(tmp_path / 'bag.mcap', params=REAL_TIME, lost=lost))
+    assert open_loop(loop, 'gvc', GAINS).notes == (
+        '4 odometry messages that it answered came before the first one of the bag: this law '
+        'begins without their integrals',
+        '1 odometry messages that it answered came after the last one of the bag',
+    )
+
+
 def test_without_derivatives_differences_are_taken(tmp_path: Path) -> None:
     loop = recorded_loop(write(tmp_path / 'bag.mcap', accel=False))
     slope = np.diff(rows(COUNT, 6), axis=0, prepend=rows(1, 6)) / (STEP / 1e9)

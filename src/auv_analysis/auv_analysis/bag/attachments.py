@@ -1,6 +1,7 @@
 """What the attachments of a bag say of its run: parameters, law, vehicle, scenario."""
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,9 @@ from auv_analysis.bag.reading import BagContents
 from auv_analysis.scenario.fault_words import Mark, marks_of
 from auv_dynamics.files.errors import InputError, printable
 from auv_dynamics.files.yaml_files import check, parse_yaml
+from auv_dynamics.plant.faults import ACTING, SENSING
 from auv_dynamics.plant.parameters import SCHEMA
+from auv_dynamics.ros import interface
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import load_vehicle, vehicle_from_dict
 from auv_gvc_controller.laws.law import is_unasked, make_gains
@@ -33,16 +36,25 @@ def parameters_of(contents: BagContents, bag: Path) -> dict[str, dict[str, Any]]
     found: dict[str, dict[str, Any]] = {}
     ranks: dict[str, int] = {}
     own = (contents.namespace or '').strip('/')
-    for name, entry in parse_yaml(text, file, 'parameter').items():
-        values = entry.get('ros__parameters') if isinstance(entry, dict) else None
-        if not isinstance(values, dict):
-            raise InputError(file, name, 'a mapping with ros__parameters', entry)
-        space, _, node = name.rpartition('/')
-        space = space.strip('/')
+    for space, node, values in _nodes(parse_yaml(text, file, 'parameter'), file):
         rank = OWN if space == own else int(not space or '*' in space)
         if rank >= ranks.get(node, OWN if contents.is_of_another else 0):
             found[node], ranks[node] = values, rank
     return found
+
+
+def _nodes(entries: dict[str, Any], file: str, above: str = '') -> Iterator[tuple[str, str, Any]]:
+    """Namespace, name and parameters of each node; mappings around it name its namespace."""
+    for key, entry in entries.items():
+        name = f'{above}/{key}'.strip('/')
+        values = entry.get('ros__parameters') if isinstance(entry, dict) else None
+        if isinstance(values, dict):
+            space, _, node = name.rpartition('/')
+            yield space.strip('/'), node, values
+        elif isinstance(entry, dict) and any(isinstance(inner, dict) for inner in entry.values()):
+            yield from _nodes(entry, file, name)
+        else:
+            raise InputError(file, name, 'a mapping with ros__parameters', entry)
 
 
 def step_of(parameters: dict[str, dict[str, Any]], bag: Path) -> float | None:
@@ -93,6 +105,27 @@ def notes_on(law: str) -> list[str]:
     if not is_unasked(law):
         return []
     return [f'gains of {law} not looked at: a bag brings no code; --law {law} imports its module']
+
+
+def notes_on_missing(contents: BagContents, kinds: set[str], topics: set[str]) -> list[str]:
+    """What counts for what is not recorded, where the scenario or a topic says that it was there.
+
+    Parameters
+    ----------
+    contents : of the bag, whose scenario has been read
+    kinds, topics : of the faults; that are recorded
+
+    """
+    text = contents.attachments.get('scenario.yaml')
+    data = {} if text is None else parse_yaml(text, 'scenario.yaml', 'scenario')
+    there = {*data, *kinds, *topics}
+    counts = (
+        (interface.GROUND_TRUTH, {'sensors', *SENSING}, 'what was measured counts as the truth'),
+        (interface.WRENCH_APPLIED, {'actuators', *ACTING}, 'the command counts as applied'),
+        (interface.DISTURBANCE_ESTIMATE, {interface.DISTURBANCE}, 'f is unknown, F not used'),
+    )
+    missing = [entry for entry in counts if entry[0] not in topics and there & entry[1]]
+    return [f'{topic}: no messages: {instead}' for topic, _, instead in missing]
 
 
 def vehicle_of(contents: BagContents, bag: Path, vehicle: str | Path | None) -> Vehicle:

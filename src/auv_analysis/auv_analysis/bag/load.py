@@ -100,7 +100,7 @@ def open_bag(
     counted = {role: stamps for role, (stamps, _) in series.items()
                if not (held and role in SETPOINTS)}  # fmt: skip
     dropped = [note for role, stamps in counted.items() for note in _dropped(role, stamps, len(ns))]
-    facts = _facts(contents, bag, vehicle, ns, [*begun, *dropped])
+    facts = _facts(contents, bag, vehicle, ns, {*values}, [*begun, *dropped])
     return Recording(_run(ns, values, facts, whole), contents.attachments)
 
 
@@ -159,14 +159,16 @@ def _dropped(role: str, stamps: np.ndarray, kept: int) -> list[str]:
 
 
 def _facts(
-    contents: BagContents, bag: Path, vehicle: str | Path | None, ns: np.ndarray, notes: list[str]
-) -> dict[str, Any]:
+    contents: BagContents, bag: Path, vehicle: str | Path | None, ns: np.ndarray,
+    topics: set[str], notes: list[str],
+) -> dict[str, Any]:  # fmt: skip
     """What a `Run` has beside its samples; stamps (n,) say the step if nothing else does."""
     parameters = attachments.parameters_of(contents, bag)
     step = attachments.step_of(parameters, bag)
     law, gains = attachments.law_and_gains(parameters.get('controller_node', {}), bag)
     known = attachments.vehicle_of(contents, bag, vehicle)
-    gaps = _gaps(ns)
+    faults, gaps = attachments.faults_of(contents, known), _gaps(ns)
+    notes = [*notes, *attachments.notes_on_missing(contents, {f.kind for f in faults}, topics)]
     if lost := sum(end - begin for begin, end in gaps):
         counted = f'{len(gaps)} gap{"s" * (len(gaps) > 1)}'
         notes = [*notes, f'no samples in {counted}, {lost:.6g} s together']
@@ -179,7 +181,7 @@ def _facts(
         'step': float(np.median(np.diff(ns))) / interface.NANOSECONDS if step is None else step,
         'source': 'bag',
         'kinds': attachments.kinds_of(contents, bag),
-        'faults': attachments.faults_of(contents, known),
+        'faults': faults,
         'gaps': gaps,
         'notes': (*contents.notes, *attachments.notes_on(law), *notes),
     }
@@ -193,14 +195,18 @@ def _gaps(ns: np.ndarray) -> tuple[tuple[float, float], ...]:
 
 
 def _run(ns: np.ndarray, values: dict[str, np.ndarray], facts: dict[str, Any], whole: float) -> Run:
-    """Run of complete steps; nu_d is NaN where not recorded, nu_d_dot then the slope of nu_d."""
+    """Run of complete steps; NaN is what was not recorded, nu_d_dot then the slope of nu_d.
+
+    Where f was not, F alone says nothing of the error of an estimate, and is left out.
+    """
     x = values.get(interface.GROUND_TRUTH, values[interface.ODOM])
     t = ((rows_of(ns, here) - ns[0]) / interface.NANOSECONDS for here in slices(len(ns)))
-    zeros, unknown = (np.broadcast_to(value, (len(ns), 6)) for value in (0.0, np.nan))
+    unknown = np.broadcast_to(np.nan, (len(ns), 6))
     nu_d, nu_d_dot = values.get(interface.CMD_VEL, unknown), values.get(interface.CMD_ACCEL)
     if nu_d_dot is None:
         nu_d_dot = gathered(_slopes(nu_d, facts['step']), whole)
     sensing = interface.GROUND_TRUTH in values
+    f = values.get(interface.DISTURBANCE_ESTIMATE)
     return Run(
         **facts,
         t=gathered(t, whole),
@@ -209,8 +215,8 @@ def _run(ns: np.ndarray, values: dict[str, np.ndarray], facts: dict[str, Any], w
         nu_d=nu_d,
         nu_d_dot=nu_d_dot,
         tau=values[interface.WRENCH],
-        disturbance=values.get(interface.DISTURBANCE),
-        disturbance_estimate=values.get(interface.DISTURBANCE_ESTIMATE, zeros),
+        disturbance=None if f is None else values.get(interface.DISTURBANCE),
+        disturbance_estimate=unknown if f is None else f,
         measured=values[interface.ODOM][:, 7:] if sensing else None,
         applied=values.get(interface.WRENCH_APPLIED),
     )

@@ -311,11 +311,17 @@ class _Course:
         number = np.cumsum(anew & active)
         self._stretches = dict(zip(answered[active].tolist(), number[active].tolist(), strict=True))
         left = np.count_nonzero(~np.isin(odometry, answered[active]))
-        lost = np.count_nonzero(~np.isin(answered[active], odometry))
+        lost = answered[active & ~np.isin(answered, odometry)]
+        early = np.count_nonzero(lost < odometry.min())
+        late = np.count_nonzero(lost > odometry.max())
+        within = len(lost) - early - late
         told = (
             (left, 'odometry messages left out, since the recorded law was not in charge'),
-            (lost, 'odometry messages that it answered are not in the bag: integrated over'),
-        )
+            (within, 'odometry messages that it answered are not in the bag: integrated over'),
+            (early, 'odometry messages that it answered came before the first one of the bag: '
+             'this law begins without their integrals'),
+            (late, 'odometry messages that it answered came after the last one of the bag'),
+        )  # fmt: skip
         self.notes = tuple(f'{count} {text}' for count, text in told if count)
 
     def stretch(self, ns: int) -> int:

@@ -280,7 +280,7 @@ class _Builder:
             if len(far):
                 self._outside = float(block.t[far[-1]] - self._run.start)
                 self._left = self._seen - len(block.t) + int(far[-1])
-        self._estimates |= bool(np.any(block.disturbance_estimate != 0.0))
+        self._estimates |= bool(np.any(np.abs(block.disturbance_estimate) > 0.0))
         if block.applied is not None:
             self._missed |= np.any(block.tau != block.applied, axis=0)
         if block.disturbance is not None:

@@ -155,7 +155,7 @@ class Run(RunInfo):
     nu_d, nu_d_dot : (n + 1, 6) set-point and its derivative, NaN where they are not known
     tau : (n + 1, 6) commanded wrench, N and N m, body frame
     disturbance : (n + 1, 6) lumped uncertainty F of (1), or None where it is not known
-    disturbance_estimate : (n + 1, 6) f of the law
+    disturbance_estimate : (n + 1, 6) f of the law, NaN where a bag does not have it
     measured : (n + 1, 6) velocity that the law saw; None: the true one
     applied : (n + 1, 6) wrench that the actuators delivered; None: the command
     law_state : (n + 1, m) the law's integrals, None where they are not known

@@ -127,6 +127,20 @@ def test_without_a_set_point_there_is_no_error_of_it(tmp_path: Path) -> None:
     assert 'the set-point were recorded' in found['lyapunov']['reason']
 
 
+def test_damage_before_the_first_odometry_is_said(tmp_path: Path) -> None:
+    bag = write(tmp_path, [1000, 1020, 1040], [])
+    data = bag.read_bytes()
+    at = data.index(b'zstd') + 20
+    bag.write_bytes(data[:at] + b'\xff' + data[at + 1 :])
+    with pytest.raises(InputError, match=r'odom: .*found bag.mcap: damaged from .*recover'):
+        load_run(bag)
+
+
+def test_one_step_is_no_run(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r'at least two steps .*, found 1$'):
+        load_run(write(tmp_path, [1000], []))
+
+
 def test_a_pause_is_a_gap_in_lock_step_too(tmp_path: Path) -> None:
     stamps = [1000, 1020, 1041, 1060, 1080, 61080, 61100, 61121, 61140]
     run = load_run(write(tmp_path, stamps, SETPOINTS, params=STEPS))

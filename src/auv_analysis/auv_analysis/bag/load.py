@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_analysis.bag import attachments
+from auv_analysis.bag.mcap_file import DAMAGED
 from auv_analysis.bag.reading import (
     BagContents,
     Series,
@@ -96,7 +97,8 @@ def open_bag(
         series = held_series(series, whole)
     ns, values = complete(series, whole)
     if len(ns) < 2:
-        raise NotOursError(bag, '', 'at least two steps that are complete on all step topics', '0')
+        expected = 'at least two steps that are complete on all step topics'
+        raise NotOursError(bag, '', expected, f'{len(ns)}')
     counted = {role: stamps for role, (stamps, _) in series.items()
                if not (held and role in SETPOINTS)}  # fmt: skip
     dropped = [note for role, stamps in counted.items() for note in _dropped(role, stamps, len(ns))]
@@ -256,7 +258,6 @@ def topics_of_one_graph(contents: BagContents, bag: Path) -> dict[str, str]:
     """
     topics = set(contents.messages)
     space = _namespace(topics, contents, bag)
-    found = ', '.join(sorted(contents.types)) or 'no topics'
     frames = contents.frames[space]
     named = all(named_axes(name) == NED_FSD for name in (frames.odom, frames.base))
     if 'params.yaml' not in contents.attachments and not named:
@@ -266,13 +267,22 @@ def topics_of_one_graph(contents: BagContents, bag: Path) -> dict[str, str]:
     ours = {role: f'{space}{role}' for role in READERS if f'{space}{role}' in topics}
     for role in REQUIRED:
         if role not in ours:
-            raise NotOursError(bag, role, 'messages', found)
+            raise _without(role, contents, bag)
     return ours
+
+
+def _without(role: str, contents: BagContents, bag: Path) -> InputError:
+    """Refusal of a bag without messages of a role: damage may have taken them."""
+    topics = [topic for topic in contents.types if role_of(topic) == role]
+    damage = [note for note in contents.notes if DAMAGED in note]
+    if damage and (topics or not contents.types):
+        key, *_ = *topics, role
+        return InputError(bag, key, 'messages', f'{damage[0]}: auv recover may find more')
+    return NotOursError(bag, role, 'messages', ', '.join(sorted(contents.types)) or 'no topics')
 
 
 def _namespace(topics: set[str], contents: BagContents, bag: Path) -> str:
     """Namespace that is read, as it stands before our names."""
-    found = ', '.join(sorted(contents.types)) or 'no topics'
     spaces = sorted(namespace_of(t) for t in topics if role_of(t) == interface.ODOM)
     whole = [space for space in spaces if all(f'{space}{role}' in topics for role in REQUIRED)]
     if not spaces and contents.namespace is not None:
@@ -283,9 +293,10 @@ def _namespace(topics: set[str], contents: BagContents, bag: Path) -> str:
             expected = f'{interface.ODOM} in it, or --namespace with one that has it'
             raise InputError(bag, key, expected, listed)
         if contents.asked:
+            found = ', '.join(sorted(contents.types)) or 'no topics'
             raise InputError(bag, key, interface.ODOM, found)
     if not spaces:
-        raise NotOursError(bag, interface.ODOM, 'messages', found)
+        raise _without(interface.ODOM, contents, bag)
     if len(whole) > 1:
         listed = ', '.join(space.rstrip('/') or '/' for space in whole)
         raise InputError(bag, '', 'one vehicle, or --namespace with that of one', listed)

@@ -46,6 +46,7 @@ from auv_analysis.bag.chunks import (
 from auv_analysis.bag.limits import Counts, TooLargeError, TooManyError, decompressed
 from auv_dynamics.files.errors import InputError, first_line
 
+DAMAGED = 'damaged from byte'
 MAGIC = b'\x89MCAP0\r\n'
 RESERVED = range(0x10, 0x80)  # opcodes that mean nothing yet; above, they are private
 DAMAGES = (  # what reading a damaged record may end in
@@ -208,7 +209,7 @@ class McapFile:
     def _note_damage(self, lost: Lost) -> None:
         if lost.start <= len(MAGIC):
             raise InputError(self.path, '', 'an MCAP file', lost.why)
-        about = f'damaged from byte {lost.start}, read up to there'
+        about = f'{DAMAGED} {lost.start}, read up to there'
         self._notes.append(f'{self.path.name}: {about}')
 
     def _is_new(self, part: McapRecord | MessageTable) -> bool:

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.metrics.certificate import certificate, derivative, integral_of, sampled_integral
+from auv_analysis.metrics.lyapunov import lyapunov
 from auv_dynamics import load_vehicle
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model
@@ -95,3 +96,14 @@ def test_the_integral_is_the_laws_own_or_that_of_what_it_saw_or_unknown():
         'anti-windup may have stopped it'
     )
     assert integral_of(replace(recorded, hold='continuous')) is None
+
+
+def test_a_run_that_begins_behind_its_law_has_no_certificate() -> None:
+    case = load_scenario('case1')
+    short = replace(case, data={**case.data, 'duration': 0.5})
+    whole = replace(simulate(short, 'gvc', 'zoh'), law_state=None)
+    model = control_model(whole.vehicle)
+    assert lyapunov(whole, model)['sup_z'] is not None
+    found = lyapunov(whole.part(slice(10, None)), model)
+    assert (found['applicable'], found['sup_z'], found['share_bound_28']) == (False, None, None)
+    assert 'the law had begun before the first sample' in found['reason']

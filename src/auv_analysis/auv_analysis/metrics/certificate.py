@@ -252,6 +252,11 @@ def integral_of(run: Run, start: np.ndarray | None = None) -> np.ndarray | None:
     return sampled_integral(run.t, run.nu_d - run.nu_measured, start)
 
 
+def began_before(run: Run) -> bool:
+    """Whether a law had adapted before the first sample, so that its z there is not known."""
+    return run.law_state is None and bool((np.abs(run.disturbance_estimate[0]) > 0.0).any())
+
+
 def certificate_blocks(run: Run, model: ControlModel, rows: int = BLOCK) -> Iterator[Certificate]:
     """Certificate of each block of a run of one of the `LAWS` with known gains.
 
@@ -268,10 +273,10 @@ def certificate_blocks(run: Run, model: ControlModel, rows: int = BLOCK) -> Iter
 
     """
     gains = make_gains(run.law, run.gains)
-    start = None
+    start, late = None, began_before(run)
     for wide, inside in run.wide_blocks(MARGIN, rows):
         unknown = np.full(wide.nu.shape, np.nan)
-        z = integral_of(wide, start)
+        z = None if late else integral_of(wide, start)
         start = None if z is None else z[max(inside.stop - MARGIN, 0)]  # where the next one begins
         F, f = wide.disturbance, wide.disturbance_estimate
         z, F = unknown if z is None else z, unknown if F is None else F

@@ -192,6 +192,13 @@ def test_candidates_are_those_with_messages_the_likeliest_first() -> None:
     )
 
 
+def test_of_topics_that_come_as_often_the_one_that_is_called_so_is_likeliest() -> None:
+    names = ['/disturbance', '/wrench', '/wrench_applied']
+    contents = BagContents(types=dict.fromkeys(names, 'geometry_msgs/msg/WrenchStamped'))
+    contents.counts = dict.fromkeys(names, 401)
+    assert candidates(contents)['wrench'] == ['/wrench', '/wrench_applied', '/disturbance']
+
+
 @pytest.mark.parametrize(('kinds', 'options'), [
     ({'/p': 'geometry_msgs/msg/PoseStamped', '/v': 'geometry_msgs/msg/TwistStamped',
       '/rov/pwm': 'std_msgs/msg/Float64MultiArray'},

@@ -224,7 +224,7 @@ def candidates(contents: BagContents) -> dict[str, list[str]]:
     found['twist'] = [topic for topic in found['twist'] if not _is_asked(topic)]
     found['thrusters'] = [topic for topic in found['thrusters'] if _has_word(topic, THRUSTING)]
     return {
-        role: sorted(topics, key=lambda topic: (-contents.counts[topic], topic))
+        role: sorted(topics, key=lambda t: (-contents.counts[t], not _has_word(t, {role}), t))
         for role, topics in found.items()
     }
 

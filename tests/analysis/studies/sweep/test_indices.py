@@ -11,6 +11,7 @@ from auv_analysis.studies.sweep.analysis import analysed
 from auv_analysis.studies.sweep.dataset import open_sweep
 from auv_analysis.studies.sweep.indices import designed
 from auv_analysis.studies.sweep.indices import indices as indices_of
+from auv_dynamics.files.shipped import shipped
 from auv_dynamics.vehicle import DOFS
 
 ENERGY = 'kinetic_energy.mean'
@@ -82,7 +83,8 @@ def test_a_base_point_with_a_failed_row_is_left_out_whole(tmp_path: Path, approv
     results = analysed(open_sweep(make_sweep(tmp_path, SALTELLI, failing)))
     found = [row for row in results.tables['indices'] if row['figure'] == ENERGY
              and row['with'] is None and row['case'] == 'integrator = ode5']  # fmt: skip
-    assert 'no row failed' in ' '.join(results.notes)
+    lost = len({index // 8 for index in range(5, 4096, 80)})
+    assert f'the {512 - lost} of 512 base points' in ' '.join(results.notes)
     approved.add(results.notes)
     lost = len({index // 8 for index in range(5, 2048, 80)})
     assert {row['points'] for row in found} == {256 - lost}
@@ -148,10 +150,55 @@ def test_a_figure_that_is_the_same_everywhere_has_no_indices(tmp_path: Path, fig
 @pytest.mark.parametrize('count', [7, 8])
 def test_of_fewer_than_eight_trajectories_there_are_no_indices(tmp_path: Path, count: int) -> None:
     text = MORRIS.replace('count: 12', f'count: {count}')
-    found = indices(make_sweep(tmp_path, text, linear))
+    results = analysed(open_sweep(make_sweep(tmp_path, text, linear)))
+    found = [row for row in results.tables['indices'] if row['figure'] == ENERGY]
     assert [(row['path'], row['points'], row['of']) for row in found] == (
         [(path, 8, 8) for path in (A, B, C)] if count == 8 else []
     )
+    assert ('no indices' in ' '.join(results.notes)) is (count == 7)
+
+
+def test_of_indices_that_do_not_exist_it_is_said_that_there_are_none(
+    tmp_path: Path, approved
+) -> None:
+    """9 rows fail, each in a trajectory of its own of 12 and in the first case alone."""
+
+    def failing(controller, values, index):
+        failed = np.isin(index, range(0, 36, 4))
+        status = np.where(failed, 'refused', 'ok').astype(object)
+        energy = linear(controller, values, index)[ENERGY]
+        return {ENERGY: np.where(failed, np.nan, energy), 'status': status}
+
+    vary = 'vary:\n  - grid: {integrator: [ode5, rk4]}'
+    text = MORRIS.replace('vary:', vary)
+    results = analysed(open_sweep(make_sweep(tmp_path, text, failing)))
+    found = {row['case'] for row in results.tables['indices']}
+    assert found == {'integrator = rk4'}
+    assert 'in 1 of 2 cases' in ' '.join(results.notes)
+    approved.add(results.notes)
+
+
+@pytest.mark.parametrize(
+    ('scenario', 'varied', 'noisy'),
+    [
+        ('sensors: {velocity_noise: 0.01}', '', True),
+        ('sensors: {velocity_noise: 0.0, drop_out: 0.0}', '', False),
+        ('sensors: {drop_out: 0.0}', 'sensors.drop_out: {uniform: {from: 0.0, to: 0.5}}', True),
+        ('faults: [{kind: wrench_loss, from: 0.1, probability: 0.5}]', '', True),
+        ('faults: [{kind: wrench_loss, from: 0.1, to: 0.2}]', '', False),
+    ],
+)
+def test_noise_in_the_indices_is_said(
+    tmp_path: Path, approved, scenario: str, varied: str, noisy: bool
+) -> None:
+    """Every rollout has a seed of its own, so that its noise counts as an effect of each path."""
+    case1 = shipped('scenarios', 'case1').read_text()
+    (tmp_path / 'noisy.yaml').write_text(f'{case1}\n{scenario}\n')
+    text = MORRIS.replace('scenario: case1', 'scenario: noisy.yaml\nhold: zoh')
+    text = text.replace('    count: 12', f'      {varied}\n    count: 12')
+    notes = analysed(open_sweep(make_sweep(tmp_path, text, linear))).notes
+    assert bool(notes) is noisy
+    approved.add(notes)
 
 
 def test_values_of_another_design_are_not_taken_for_it(tmp_path: Path, approved) -> None:

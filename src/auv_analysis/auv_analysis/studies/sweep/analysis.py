@@ -23,7 +23,7 @@ from auv_analysis.studies.sweep.dataset import (
     factors_of,
     numbers_of,
 )  # fmt: skip
-from auv_analysis.studies.sweep.indices import Designed, designed, failing, indices, omitted
+from auv_analysis.studies.sweep.indices import Designed, designed, indices, omitted, reached
 from auv_analysis.studies.sweep.quantiles import (
     Ordered,
     Row,
@@ -344,7 +344,7 @@ def analysed(sweep: Sweep, by: str = BEST_BY) -> Analysis:
     analysis.notes = [
         *notes,
         *_tied(sweep),
-        *(n for group in groups for n in failing(sweep, group)),
+        *(n for group in groups for n in reached(sweep, group)),
     ]
     with ThreadPoolExecutor(THREADS) as pool:
         for factor, controller in product(analysis.factors, sweep.controllers):

@@ -147,13 +147,11 @@ def indices(sweep: Sweep, entry: Designed, values: np.ndarray, measure: Measure)
     for i, controller in enumerate(sweep.controllers):
         for other, case in enumerate(entry.cases):
             rows = _rows(sweep, entry, i, other)
-            if np.isnan(values[rows]).any():
+            if not np.isfinite(values[rows]).all():
                 continue
-            Y = np.full(size, np.nan)
+            Y, whole = np.full(size, np.nan), _whole(entry, rows)
             Y[entry.positions[rows]] = values[rows]
-            blocks = Y.reshape(-1, entry.step)
-            whole = np.isfinite(blocks).all(axis=1)
-            used = blocks[whole]
+            used = Y.reshape(-1, entry.step)[whole]
             if len(used) < FEWEST or np.ptp(used) <= 1e-12 * np.abs(used).max():
                 continue
             names: Row = {'method': 'sobol' if entry.kind == 'saltelli' else 'morris'}
@@ -169,6 +167,13 @@ def _rows(sweep: Sweep, entry: Designed, controller: int, other: int) -> np.ndar
     return (sweep.controller == controller) & (sweep.status == 0) & (entry.others == other)
 
 
+def _whole(entry: Designed, rows: np.ndarray) -> np.ndarray:
+    """Mask of the base points or trajectories of which all rows are among these (n,)."""
+    there = np.zeros(int(entry.spec['count']) * entry.step, bool)
+    there[entry.positions[rows]] = True
+    return np.all(there.reshape(-1, entry.step), axis=1)
+
+
 def omitted(sweep: Sweep, entry: Designed, values: np.ndarray, measure: Measure) -> Iterator[str]:
     """What has to be said of a measure that has no indices since some rows have no such figure."""
     for i, controller in enumerate(sweep.controllers):
@@ -182,15 +187,43 @@ def omitted(sweep: Sweep, entry: Designed, values: np.ndarray, measure: Measure)
             )
 
 
-def failing(sweep: Sweep, entry: Designed) -> Iterator[str]:
-    """What has to be said of indices of a design in which rows failed."""
+def reached(sweep: Sweep, entry: Designed) -> Iterator[str]:
+    """What has to be said of a design of which a part has no indices, or whose rows are noisy."""
+    paths, of = ', '.join(entry.paths), int(entry.spec['count'])
+    saltelli = entry.kind == 'saltelli'
+    blocks, biased = ('base points', 'S_T') if saltelli else ('trajectories', 'μ* and σ')
+    there = 0
     for i, controller in enumerate(sweep.controllers):
-        failed = int(((sweep.controller == i) & (sweep.status != 0)).sum())
-        if failed:
+        whole = [_whole(entry, _rows(sweep, entry, i, k)).sum() for k in range(len(entry.cases))]
+        used = [int(count) for count in whole if count >= FEWEST]
+        there += len(used)
+        if sum(used) < of * len(used):
             yield (
-                f'indices of {", ".join(entry.paths)} under {controller} are of the part of the '
-                f'design where no row failed: {failed} did'
+                f'indices of {paths} under {controller} are of the {sum(used)} of '
+                f'{of * len(used)} {blocks} whose rows all came to their end'
             )
+        if lacking := len(whole) - len(used):
+            where = f' in {lacking} of {len(whole)} cases' if used else ''
+            yield (
+                f'no indices of {paths} under {controller}{where}: fewer than {FEWEST} of {of} '
+                f'{blocks} have rows that all came to their end'
+            )
+    if there and _noisy(sweep):
+        yield (
+            f'{biased} of {paths} contain the noise of sensors or faults, which every rollout '
+            'draws for itself: above 0 without any effect'
+        )
+
+
+def _noisy(sweep: Sweep) -> bool:
+    """Whether the seed of a rollout, which no two have in common, matters to its figures."""
+    scenario = sweep.manifest['scenario']
+    chances = [fault.get('probability', 1.0) for fault in scenario.get('faults', ())]
+    return (
+        any(np.any(value) for value in scenario.get('sensors', {}).values())
+        or any(0.0 < chance < 1.0 for chance in chances)
+        or any(p.startswith('sensors.') or p.endswith('.probability') for p in sweep.paths)
+    )
 
 
 def _sobol(entry: Designed, Y: np.ndarray, whole: np.ndarray) -> Iterator[Row]:

@@ -91,6 +91,28 @@ def test_out_is_heard_and_the_bag_never_replaced(monkeypatch, capsys, tmp_path) 
     assert bag.read_text() == 'theirs'
 
 
+@pytest.mark.parametrize(
+    ('bag', 'file'),
+    [
+        ('k_D=0.5', 'k_D=0.5.rrd'),
+        ('log.1.mcap', 'log.1.rrd'),
+        ('.', 'inner.rrd'),
+        ('..', 'outer.rrd'),
+    ],
+)
+def test_the_file_is_named_as_the_bag(monkeypatch, tmp_path, bag: str, file: str) -> None:
+    """A dot in the name of a folder begins no ending, and `.` is a folder of another name."""
+    monkeypatch.setattr(rerun_export, 'library', lambda: None)
+    monkeypatch.setattr(rerun_export, 'export', lambda _, out: out.write_text('ours') or SAMPLES)
+    monkeypatch.setattr('auv_analysis.bag.load.open_bag', lambda _: SimpleNamespace(run=made_run()))
+    inner = tmp_path / 'outer' / 'inner'
+    (inner / 'k_D=0.5').mkdir(parents=True)
+    (inner / 'log.1.mcap').touch()
+    monkeypatch.chdir(inner)
+    main(['export-rerun', bag])
+    assert [path.name for path in tmp_path.rglob('*.rrd')] == [file]
+
+
 def exported(run: Run, path: Path) -> dict[str, dict[str, list]]:
     """Entity of the file of a run -> component -> its values, by rising time."""
     need('rerun-sdk', find_spec('rerun'))

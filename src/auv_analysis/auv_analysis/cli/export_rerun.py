@@ -22,7 +22,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
     library()  # before anything is read
     bag = options.bag
-    out = options.out or bag.with_suffix('.rrd')
+    named = bag if bag.name.strip('.') else bag.resolve()  # `.` and `..` name nothing
+    out = options.out or named.with_name(f'{named.name if named.is_dir() else named.stem}.rrd')
     check_file(out, overwrite=options.overwrite, inputs=[bag])
     run = open_bag(bag).run
     samples = export(run, out)

@@ -428,6 +428,10 @@ def test_poles_ahead_say_whether_a_vehicle_keeps_its_course(written):
     heavy_above['rigid_body']['center_of_gravity'] = [0.0, 0.0, -0.02]
     turns_over = cruise(written(heavy_above), 1.0)
     assert (turns_over['verdict'], turns_over['hint']) == ('unstable', None)
+    heavy_above['added_mass'][1] = 25.0
+    turned = cruise(written(heavy_above), 1.0)
+    assert (turned['verdict'], turned['hint']) == ('unstable', None), 'as it does at rest'
+    assert cruise(written(heavy_above), 0.0)['hint'] is None
 
 
 @pytest.mark.parametrize(

@@ -180,8 +180,9 @@ def _cruise(vehicle: Vehicle, speed: float | None) -> dict[str, Any]:
     source = 'given' if speed is not None else 'top speed' if known else 'assumed'
     if speed is None:
         speed = float(known.split()[0]) if known else CRUISE
-    found = modes(linearize(vehicle, [speed, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    found, at_rest = (modes(linearize(vehicle, [u, *np.zeros(5)])) for u in (speed, 0.0))
     fastest = max(found, key=lambda mode: mode['pole'][0])
+    by_speed = all(mode['pole'][0] <= 0 for mode in at_rest)
     growth = fastest['pole'][0]
     return {
         'speed': speed,
@@ -189,7 +190,7 @@ def _cruise(vehicle: Vehicle, speed: float | None) -> dict[str, Any]:
         'modes': found,
         'verdict': 'unstable' if growth > 0 else 'marginal' if growth == 0 else 'stable',
         'mostly': fastest['mostly'],
-        'hint': _munk(vehicle) if growth > 0 else None,
+        'hint': _munk(vehicle) if growth > 0 and by_speed else None,
     }
 
 

@@ -49,6 +49,13 @@ def stamped(name: str, ns: int, row: Any, frame: str = FRAMES[1]) -> Any:
     return geometry(f'{name}Stamped', header(ns, frame), geometry(name, *halves))
 
 
+def health(node: str, ns: int, facts: dict[str, str]) -> Any:
+    """What a node says of itself."""
+    pairs = [new('diagnostic_msgs/msg/KeyValue', *fact) for fact in facts.items()]
+    status = new('diagnostic_msgs/msg/DiagnosticStatus', 0, node, 'ok', 'auv', pairs)
+    return new('diagnostic_msgs/msg/DiagnosticArray', header(ns, FRAMES[1]), [status])
+
+
 def serialized(message: Any, *, little: bool = True) -> bytes:
     return bytes(TYPES.serialize_cdr(message, message.__msgtype__, little_endian=little))
 

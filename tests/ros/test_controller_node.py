@@ -1,5 +1,6 @@
 """The controller node: what it answers, what it refuses, how it lets go."""
 
+import json
 import math
 import time
 from collections.abc import Callable
@@ -282,6 +283,7 @@ def set_parameter(peer, name: str, value: ParameterValue):
 def test_lifecycle_gains_are_taken_while_inactive_only() -> None:
     with program() as peer:
         peer.add(ControllerNode, [*CONTROLLER, *parameters(autostart=False)])
+        peer.listen(topics.DIAGNOSTICS)
         assert state(peer) == 'unconfigured'
         assert change(peer, Transition.TRANSITION_CONFIGURE)
         doubles = ParameterValue(type=8, double_array_value=[20.0])
@@ -294,7 +296,18 @@ def test_lifecycle_gains_are_taken_while_inactive_only() -> None:
         assert not refused.successful
         assert 'inactive' in refused.reason
         assert change(peer, Transition.TRANSITION_DEACTIVATE)
-        assert set_parameter(peer, 'gains.k_D', doubles).successful
+        lower = ParameterValue(type=8, double_array_value=[7.0])
+        assert set_parameter(peer, 'gains.k_D', lower).successful
+        assert change(peer, Transition.TRANSITION_ACTIVATE)
+        assert change(peer, Transition.TRANSITION_DEACTIVATE)
+
+        def said() -> set[tuple[str, float]]:
+            status = [message.status[0] for message in peer.heard[topics.DIAGNOSTICS.name]]
+            facts = [{one.key: one.value for one in entry.values} for entry in status]
+            return {(told['law'], json.loads(told['gains'])['k_D'][0])
+                    for told in facts if told.get('active') == 'True'}  # fmt: skip
+
+        peer.until(lambda: said() == {('cl', 20.0), ('cl', 7.0)}, 'each law, however short')
 
 
 def test_limits_and_timeouts_are_taken_while_inactive_only() -> None:

@@ -1,5 +1,6 @@
 """What the files that travel with a bag say of its run."""
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,32 @@ def test_parameters_are_those_of_nodes_whatever_their_namespaces() -> None:
     for wrong in ({'plant_node': 7}, {'plant_node': {'step': 0.01}}):
         with pytest.raises(InputError, match=r'params.yaml: plant_node: expected a mapping with'):
             attachments.parameters_of(contents(params=wrong), BAG)
+
+
+SECOND = 10**9
+
+
+def told(law: str, k_D: float) -> tuple[str, str]:
+    return law, json.dumps({'k_D': [k_D], 'k_I': [1.0], 'Lambda': [0.8], 'Gamma': [60.0]})
+
+
+@pytest.mark.parametrize(('laws', 'kept', 'note'), [
+    ([told('gvc', 12.0)], ('gvc', 12.0), None),
+    ([told('cl', 12.0)], ('cl', 12.0), 'law and gains are those that the controller says'),
+    ([told('gvc', 50.0)], ('gvc', 50.0), 'law and gains are those that the controller says'),
+    ([told('gvc', 12.0), told('gvc', 50.0)], ('unknown', None), 'gvc from 0 s, gvc from 4.5 s'),
+    ([('gvc', '{')], ('gvc', 12.0), None), ([('gvc', '[1]')], ('gvc', 12.0), None),
+])  # fmt: skip
+def test_law_and_gains_are_those_that_the_controller_says(laws, kept, note) -> None:
+    bag = contents(params={'controller_node': {
+        'ros__parameters': {'law': 'gvc', 'ramp': 0.2, **GAINS, 'gains.k_P': None},
+    }})  # fmt: skip
+    bag.first, bag.laws = SECOND, {law: SECOND + 4_500_000_000 * i for i, law in enumerate(laws)}
+    own = attachments.parameters_of(bag, BAG)['controller_node']
+    assert own['ramp'] == 0.2
+    assert (own.get('law', 'unknown'), *own.get('gains.k_D', [None])) == kept
+    assert len(bag.notes) == (note is not None)
+    assert note is None or note in bag.notes[0]
 
 
 def test_a_control_period_is_a_positive_number() -> None:

@@ -1,5 +1,6 @@
 """A bag in mapped files is the run that reading it into memory gives, whatever its messages."""
 
+import json
 import mmap
 import tempfile
 import tracemalloc
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.block_runs import joined
-from helpers.made_messages import ODOMETRY, Bag, odometry, serialized, stamped
+from helpers.made_messages import ODOMETRY, Bag, health, odometry, serialized, stamped
 from helpers.strategies import examples
 from hypothesis import given
 from hypothesis import strategies as st
@@ -26,6 +27,7 @@ from auv_analysis.runs.run import Run
 from auv_dynamics.files.errors import FailedError, InputError
 
 STEP = 10_000_000
+GAINS = ('k_D', 'k_I', 'Lambda', 'Gamma')
 ROLES = {
     'odom': '', 'wrench': 'Wrench', 'cmd_vel': 'Twist', 'cmd_accel': 'Accel',
     'disturbance': 'Wrench', 'wrench_applied': 'Wrench', 'ground_truth/odom': '',
@@ -147,6 +149,26 @@ def test_without_f_nothing_is_said_of_its_error(tmp_path) -> None:
     assert summarize(run)['lumped_error'] == {'rms': None, 'max_after_2s': None}
     assert run.notes == ('disturbance_estimate: no messages: f is unknown, F not used',)
     assert not digest(run).estimates
+
+
+def test_a_law_that_was_changed_while_it_was_recorded_is_not_that_of_its_file(tmp_path) -> None:
+    bag = Bag(tmp_path / 'bag.mcap')
+    bag.attach('vehicle.yaml', VEHICLE)
+    gains = 'gains.k_D: [1.0], gains.k_I: [1.0], gains.Lambda: [1.0], gains.Gamma: [1.0]'
+    bag.attach('params.yaml', f'controller_node: {{ros__parameters: {{law: gvc, {gains}}}}}')
+    for k in range(9):
+        for made in (odometry(k * STEP, turning(k)), stamped('Wrench', k * STEP, np.ones(6))):
+            topic = '/odom' if made.__msgtype__ == ODOMETRY else '/wrench'
+            bag.add(topic, made.__msgtype__, k * STEP, serialized(made))
+        for name, law in (('/other/controller_node', 'pid'),
+                          ('/controller_node', 'gvc' if k < 5 else 'cl')):  # fmt: skip
+            facts = {'law': law, 'gains': json.dumps({name: [1.0] for name in GAINS})}
+            said = health(name, k * STEP, facts)
+            bag.add('/diagnostics', said.__msgtype__, k * STEP, serialized(said))
+    run = load_run(bag.close())
+    assert (run.law, run.gains) == ('unknown', {})
+    assert [note for note in run.notes if 'gvc from 0 s, cl from 0.05 s' in note]
+    assert summarize(run)['gains'] == {'K_D': None, 'K_f': None}
 
 
 def test_a_step_that_nobody_says_is_the_usual_one(tmp_path) -> None:

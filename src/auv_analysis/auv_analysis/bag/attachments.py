@@ -1,5 +1,6 @@
 """What the attachments of a bag say of its run: parameters, law, vehicle, scenario."""
 
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ from auv_dynamics.files.yaml_files import check, parse_yaml
 from auv_dynamics.plant.faults import ACTING, SENSING
 from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.ros import interface
+from auv_dynamics.ros.interface import CONTROLLER, NANOSECONDS
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import load_vehicle, vehicle_from_dict
 from auv_gvc_controller.laws.law import is_unasked, make_gains
@@ -19,28 +21,58 @@ from auv_gvc_controller.laws.law import is_unasked, make_gains
 NAME = re.compile('[A-Za-z0-9][A-Za-z0-9_.+-]{0,99}')
 LAW = re.compile(r'[A-Za-z_][\w.]*:[A-Za-z_]\w*', re.ASCII)  # module:Class
 UNFIT = re.compile('[^A-Za-z0-9_.+-]+')
+GAINS = 'gains.'  # begin of the names of their parameters
 UNKNOWN = 'unknown'  # law of a bag without params.yaml
+Parameters = dict[str, dict[str, Any]]  # of nodes, by their names
 OWN = 2  # rank of parameters for the namespace; 1: for any, 0: for another
 
 
-def parameters_of(contents: BagContents, bag: Path) -> dict[str, dict[str, Any]]:
+def parameters_of(contents: BagContents, bag: Path) -> Parameters:
     """Node name -> its parameters, from the attached parameter file.
 
     Of several nodes of a name, that in the namespace which is read; where it is not the recorder's,
-    no other, since whatever names no namespace is of the recorder's vehicle.
+    no other, since whatever names no namespace is of the recorder's vehicle. Law and gains are
+    those that the controller says it has: they may have changed since the file was written.
     """
     text = contents.attachments.get('params.yaml')
     if text is None:
         return {}
     file = f'{bag}: params.yaml'
-    found: dict[str, dict[str, Any]] = {}
+    found: Parameters = {}
     ranks: dict[str, int] = {}
     own = (contents.namespace or '').strip('/')
     for space, node, values in _nodes(parse_yaml(text, file, 'parameter'), file):
         rank = OWN if space == own else int(not space or '*' in space)
         if rank >= ranks.get(node, OWN if contents.is_of_another else 0):
             found[node], ranks[node] = values, rank
+    if CONTROLLER in found and contents.laws:
+        found[CONTROLLER] = _in_charge(found[CONTROLLER], contents)
     return found
+
+
+def _in_charge(controller: dict[str, Any], contents: BagContents) -> dict[str, Any]:
+    """Parameters of a controller with the law and gains in charge; of several, with none."""
+    written = {name for name in controller if name == 'law' or name.startswith(GAINS)}
+    others = {name: value for name, value in controller.items() if name not in written}
+    if len(contents.laws) > 1:
+        begin = contents.first or 0
+        course = ', '.join(f'{law} from {(ns - begin) / NANOSECONDS:.3g} s'
+                           for (law, _), ns in contents.laws.items())  # fmt: skip
+        contents.notes.append(f'law or gains were changed while it was recorded, none is taken: '
+                              f'{printable(course)}')  # fmt: skip
+        return others
+    ((law, text),) = contents.laws
+    try:
+        gains = json.loads(text)
+    except (ValueError, RecursionError):
+        return controller
+    if not isinstance(gains, dict):
+        return controller
+    told = {'law': law, **{f'{GAINS}{name}': value for name, value in gains.items()}}
+    if told == {name: controller[name] for name in written if controller[name]}:
+        return controller
+    contents.notes.append('law and gains are those that the controller says, not of params.yaml')
+    return {**others, **told}
 
 
 def _nodes(entries: dict[str, Any], file: str, above: str = '') -> Iterator[tuple[str, str, Any]]:
@@ -82,9 +114,9 @@ def law_and_gains(controller: dict[str, Any], bag: Path) -> tuple[str, dict[str,
     """Law and gains, from the parameters of the controller node; no gains of an unasked law."""
     gains = {}
     for key, value in controller.items():
-        if key.startswith('gains.'):
+        if key.startswith(GAINS):
             one = isinstance(value, list) and len(value) == 1
-            gains[key.removeprefix('gains.')] = value[0] if one else value
+            gains[key.removeprefix(GAINS)] = value[0] if one else value
     law = controller.get('law')
     file = f'{bag}: params.yaml'
     if law is None:

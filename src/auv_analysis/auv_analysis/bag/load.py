@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_analysis.bag import attachments
+from auv_analysis.bag.attachments import Parameters
 from auv_analysis.bag.mcap_file import DAMAGED
 from auv_analysis.bag.reading import (
     BagContents,
@@ -26,6 +27,7 @@ from auv_dynamics.files.errors import InputError
 from auv_dynamics.plant.plant import unwrapped_eta
 from auv_dynamics.ros import interface
 from auv_dynamics.vehicle.frames import NED_FSD, named_axes
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 WHOLE = 1 << 16  # steps up to which a recording is kept in memory
 REQUIRED = (interface.ODOM, interface.WRENCH)
@@ -90,7 +92,8 @@ def open_bag(
     topics = topics_of_one_graph(contents, bag)
     series = {role: contents.messages.pop(topic) for role, topic in topics.items()}
     series, begun = (series, []) if contents.strict else longest_stretch(series, whole)
-    controller = attachments.parameters_of(contents, bag).get('controller_node', {})
+    parameters = attachments.parameters_of(contents, bag)
+    controller = parameters.get(interface.CONTROLLER, {})
     # where the bag does not say it: a controller beside a driver held its set-points
     free = contents.strict is False or (contents.strict is None and _have_own_stamps(series))
     if held := controller.get('setpoint_pairing', LATEST if free else None) == LATEST:
@@ -102,7 +105,9 @@ def open_bag(
     counted = {role: stamps for role, (stamps, _) in series.items()
                if not (held and role in SETPOINTS)}  # fmt: skip
     dropped = [note for role, stamps in counted.items() for note in _dropped(role, stamps, len(ns))]
-    facts = _facts(contents, bag, vehicle, ns, {*values}, [*begun, *dropped])
+    known = attachments.vehicle_of(contents, bag, vehicle)
+    facts = _facts(contents, bag, parameters, known, ns, {*values})
+    facts['notes'] += *begun, *dropped
     return Recording(_run(ns, values, facts, whole), contents.attachments)
 
 
@@ -161,19 +166,17 @@ def _dropped(role: str, stamps: np.ndarray, kept: int) -> list[str]:
 
 
 def _facts(
-    contents: BagContents, bag: Path, vehicle: str | Path | None, ns: np.ndarray,
-    topics: set[str], notes: list[str],
+    contents: BagContents, bag: Path, parameters: Parameters, known: Vehicle, ns: np.ndarray,
+    topics: set[str],
 ) -> dict[str, Any]:  # fmt: skip
     """What a `Run` has beside its samples; stamps (n,) say the step if nothing else does."""
-    parameters = attachments.parameters_of(contents, bag)
     step = attachments.step_of(parameters, bag)
-    law, gains = attachments.law_and_gains(parameters.get('controller_node', {}), bag)
-    known = attachments.vehicle_of(contents, bag, vehicle)
+    law, gains = attachments.law_and_gains(parameters.get(interface.CONTROLLER, {}), bag)
     faults, gaps = attachments.faults_of(contents, known), _gaps(ns)
-    notes = [*notes, *attachments.notes_on_missing(contents, {f.kind for f in faults}, topics)]
+    notes = attachments.notes_on_missing(contents, {fault.kind for fault in faults}, topics)
     if lost := sum(end - begin for begin, end in gaps):
         counted = f'{len(gaps)} gap{"s" * (len(gaps) > 1)}'
-        notes = [*notes, f'no samples in {counted}, {lost:.6g} s together']
+        notes.append(f'no samples in {counted}, {lost:.6g} s together')
     return {
         'vehicle': known,
         'scenario': attachments.scenario_name(contents, bag),

@@ -36,7 +36,7 @@ from auv_analysis.bag.step_topics import (
 )
 from auv_dynamics.files.errors import FailedError, InputError, reason
 from auv_dynamics.ros import interface
-from auv_dynamics.ros.interface import Frames
+from auv_dynamics.ros.interface import GAINS_FACT, LAW_FACT, Frames
 
 Series = tuple[np.ndarray, np.ndarray]  # stamps (n,) in ns, values (n, 6) or (n, 13)
 TOGETHER = 64  # chunks whose small arrays are joined at once: thousands of them scatter the memory
@@ -105,6 +105,7 @@ def slices(count: int, rows: int = 1 << 13) -> Iterator[slice]:
     return (slice(i, min(i + rows, count)) for i in range(0, count, rows))
 
 
+HEALTH = 'diagnostic_msgs/msg/DiagnosticArray'
 BACK = interface.NANOSECONDS  # ns: stamps that fall by more have begun anew, less came late
 GAP_PERIODS = 5.0  # median periods, at least, that make a pause a gap
 GAP_USUAL = 3.0  # times the interval that nine of ten keep: some topics come in bursts
@@ -170,6 +171,8 @@ class BagContents(FileExtent):
     recorder : namespace of the recorder, which the attachments are of; None: the bag does not say
     strict : whether every step had to come once and in order; where it had not, a driver was free
         to say anything, and what cannot be used is left out; None: the bag does not say
+    laws : law and gains, in JSON, that the controller said to be in charge -> log time of the first
+        message that says so, ns
 
     """
 
@@ -184,6 +187,7 @@ class BagContents(FileExtent):
     asked: bool = False
     recorder: str | None = None
     strict: bool | None = None
+    laws: dict[tuple[str, str], int] = field(default_factory=dict)
 
     @property
     def is_of_another(self) -> bool:
@@ -208,7 +212,7 @@ class FileReader:
         self._path, self._contents, self._decode = path, contents, decode
         self._file = McapFile(path, contents.notes)
         self._frames = contents.frames
-        self._decoders = Decoding(path)
+        self._decoders, self._health = Decoding(path), Decoding(path)
         self._layouts: dict[int, StepLayout] = {}
         self._sizes = {name: len(text) for name, text in contents.attachments.items()}
         self._attached = sum(self._sizes.values())
@@ -268,6 +272,9 @@ class FileReader:
         if self._decode and role_of(topic) in READERS and self._is_read(topic):
             check_type(self._path, topic, kind)
             self._decoders.add(channel, schema)
+        elif self._decode and (topic, kind) == (interface.DIAGNOSTICS, HEALTH):
+            with contextlib.suppress(InputError):  # no run needs it
+                self._health.add(channel, schema)
 
     def _table(self, table: MessageTable) -> Iterator[tuple[str, Series]]:
         members = {}
@@ -276,6 +283,8 @@ class FileReader:
             self._contents.add(channel.topic, int(logged.min()), int(logged.max()), len(index))
             if channel.id in self._decoders:
                 members[channel.id] = index
+            elif channel.id in self._health:
+                self._hear_controller(table, index, channel.id)
         known = dict(self._frames)
         try:
             found = self._found(table, members)
@@ -290,6 +299,19 @@ class FileReader:
                 yield topic, (stamps, rows)
             else:
                 yield topic, entries[0][1]
+
+    def _hear_controller(self, table: MessageTable, index: np.ndarray, channel: int) -> None:
+        """Note the laws that the controller of the vehicle that is read says to be in charge."""
+        name = f'{(self._contents.namespace or "").rstrip("/")}/{interface.CONTROLLER}'
+        for i in index.tolist():
+            if name.encode() not in table.message(i):
+                continue
+            with contextlib.suppress(InputError, AttributeError, TypeError):
+                for status in self._health.message(table, i, channel).status:
+                    facts = {one.key: one.value for one in status.values}
+                    if status.name == name and LAW_FACT in facts:
+                        told = str(facts[LAW_FACT]), str(facts.get(GAINS_FACT))
+                        self._contents.laws.setdefault(told, int(table.log_times[i]))
 
     def _found(
         self, table: MessageTable, members: dict[int, np.ndarray]

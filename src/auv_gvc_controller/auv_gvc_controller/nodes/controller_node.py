@@ -1,5 +1,6 @@
 """The velocity controller as a lifecycle node: odometry and set-points in, wrench out."""
 
+import json
 import math
 import sys
 import time
@@ -19,7 +20,7 @@ from auv_dynamics.files.errors import InputError, first_line
 from auv_dynamics.files.nearest import one_of as nearest_of
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.endpoints import why_silent
-from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.ros.interface import GAINS_FACT, LAW_FACT, NANOSECONDS
 from auv_dynamics.ros.node_interface import (
     ERROR,
     OK,
@@ -93,12 +94,14 @@ class ControllerParameters:
         vehicle = load_vehicle(self._vehicle)
         self.vehicle_name = vehicle.name
         try:
-            gains = make_gains(law, self._gains(law))
+            values = self._gains(law)
+            gains = make_gains(law, values)
             try_law(gains, control_model(vehicle))
         except ValueError as error:
             gain, expected, found = refusal(error)
             key = f'{WRITABLE}{gain}' if gain else 'law'
             raise InputError(name, key, expected, found) from None
+        self.told = {LAW_FACT: law, GAINS_FACT: json.dumps(values, sort_keys=True)}
         self.settings = self._present({})
         self.settings.check_bounded()
         self.setpoints.believe(*self.settings.believed)
@@ -286,6 +289,8 @@ class ControllerNode(BulkMixin, LifecycleNode):
         if not self._build():
             return FAILURE
         self._active = True
+        self.graph.facts.update(self._health())
+        self.graph.publish_diagnostics()  # a bag has each law, however short it was in charge
         missed, self._missed = self._missed, None
         if missed is not None and self._settings.lockstep:
             try:
@@ -385,7 +390,8 @@ class ControllerNode(BulkMixin, LifecycleNode):
         if not self._active:
             return {'active': False}
         c = self._controller
-        return {'active': True, 'watchdog': c.watchdog or 'none', 'watchdog trips': c.trips}
+        watchdog = {'watchdog': c.watchdog or 'none', 'watchdog trips': c.trips}
+        return {'active': True, **watchdog, **self._settings.told}
 
     def _let_go(self) -> None:
         if not self._active:

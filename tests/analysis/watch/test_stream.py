@@ -36,6 +36,17 @@ def test_rate_and_pace_of_even_messages() -> None:
     assert (stream.heard, stream.published) == (201, 201)
 
 
+def test_a_clock_that_begins_anew_does_not_run_backwards() -> None:
+    stream = Stream()
+    now = hear(stream, range(1000))
+    for k in range(100):  # the next loop of a replay
+        now += PERIOD
+        stream.hear(now, 1001 + k, k * STEP)
+    assert stream.pace(now) == pytest.approx(1.0)
+    assert stream.rate(now) == pytest.approx(100.0)
+    assert (stream.gaps, stream.repeats) == (0, 1)
+
+
 def test_a_rate_follows_the_last_seconds_and_ends_with_the_messages() -> None:
     stream = Stream()
     now = hear(stream, range(200))

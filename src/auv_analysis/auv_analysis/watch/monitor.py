@@ -81,9 +81,10 @@ class Stream:
         self.newest, self._before = ns, None if number is None else (number, ns)
         anew = ahead not in (0, 1) and since < 0
         self.published += 1 if anew else max(ahead, 1)
+        if anew or since < -HELD_NS:  # the clock begins anew, as in a loop of a replay
+            self._window.clear()
         if anew:
             self._steps.clear()
-            self._window.clear()
             self._gaps = self._repeats = 0
         elif ahead == 1 and self._judged:
             self._judge(since)

@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
@@ -64,12 +65,22 @@ def test_law_and_gains_are_those_that_the_controller_says(laws, kept, note) -> N
     bag = contents(params={'controller_node': {
         'ros__parameters': {'law': 'gvc', 'ramp': 0.2, **GAINS, 'gains.k_P': None},
     }})  # fmt: skip
-    bag.first, bag.laws = SECOND, {law: SECOND + 4_500_000_000 * i for i, law in enumerate(laws)}
+    bag.messages['/wrench'] = np.array([5, 6]) * SECOND, np.zeros((2, 6))
+    bag.laws = [(law, at) for law, at in zip(laws, (SECOND, 9_500_000_000), strict=False)]
     own = attachments.parameters_of(bag, BAG)['controller_node']
     assert own['ramp'] == 0.2
     assert (own.get('law', 'unknown'), *own.get('gains.k_D', [None])) == kept
     assert len(bag.notes) == (note is not None)
     assert note is None or note in bag.notes[0]
+
+
+def test_a_law_that_was_changed_before_the_first_wrench_was_never_in_charge() -> None:
+    bag = contents(params={'controller_node': {'ros__parameters': {'law': 'gvc', **GAINS}}})
+    bag.messages['/wrench'] = np.array([5, 6]) * SECOND, np.zeros((2, 6))
+    course = [(told('cl', 1.0), 1), (told('gvc', 9.0), 3), (told('cl', 1.0), 5)]
+    bag.laws = [(law, at * SECOND) for law, at in course]
+    own = attachments.parameters_of(bag, BAG)['controller_node']
+    assert (own['law'], own['gains.k_D']) == ('cl', [1.0])
 
 
 def test_a_control_period_is_a_positive_number() -> None:

@@ -1,19 +1,21 @@
 """What the attachments of a bag say of its run: parameters, law, vehicle, scenario."""
 
 import json
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from auv_analysis.bag.reading import BagContents
+from auv_analysis.bag.step_topics import role_of
 from auv_analysis.scenario.fault_words import Mark, marks_of
 from auv_dynamics.files.errors import InputError, printable
 from auv_dynamics.files.yaml_files import check, parse_yaml
 from auv_dynamics.plant.faults import ACTING, SENSING
 from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.ros import interface
-from auv_dynamics.ros.interface import CONTROLLER, NANOSECONDS
+from auv_dynamics.ros.interface import CONTROLLER, NANOSECONDS, WRENCH
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import load_vehicle, vehicle_from_dict
 from auv_gvc_controller.laws.law import is_unasked, make_gains
@@ -54,14 +56,18 @@ def _in_charge(controller: dict[str, Any], contents: BagContents) -> dict[str, A
     """Parameters of a controller with the law and gains in charge; of several, with none."""
     written = {name for name in controller if name == 'law' or name.startswith(GAINS)}
     others = {name: value for name, value in controller.items() if name not in written}
-    if len(contents.laws) > 1:
-        begin = contents.first or 0
-        course = ', '.join(f'{law} from {(ns - begin) / NANOSECONDS:.3g} s'
-                           for (law, _), ns in contents.laws.items())  # fmt: skip
-        contents.notes.append(f'law or gains were changed while it was recorded, none is taken: '
-                              f'{printable(course)}')  # fmt: skip
+    wrenches = [ns for topic, (ns, _) in contents.messages.items() if role_of(topic) == WRENCH]
+    begin = min((int(ns.min()) for ns in wrenches), default=0)
+    ends = [*(ns for _, ns in contents.laws[1:]), math.inf]
+    course = [one for one, end in zip(contents.laws, ends, strict=True) if end > begin]
+    if len({told for told, _ in course}) > 1:
+        said = ', '.join(
+            f'{law} from {max(0, ns - begin) / NANOSECONDS:.3g} s' for (law, _), ns in course
+        )
+        note = 'law or gains were changed while it was recorded, none is taken'
+        contents.notes.append(f'{note}: {printable(said)}')
         return others
-    ((law, text),) = contents.laws
+    law, text = course[0][0]
     try:
         gains = json.loads(text)
     except (ValueError, RecursionError):

@@ -90,9 +90,9 @@ def open_bag(
     bag = Path(bag)
     contents = read_vehicle(bag, namespace, whole)
     topics = topics_of_one_graph(contents, bag)
+    parameters = attachments.parameters_of(contents, bag)
     series = {role: contents.messages.pop(topic) for role, topic in topics.items()}
     series, begun = (series, []) if contents.strict else longest_stretch(series, whole)
-    parameters = attachments.parameters_of(contents, bag)
     controller = parameters.get(interface.CONTROLLER, {})
     # where the bag does not say it: a controller beside a driver held its set-points
     free = contents.strict is False or (contents.strict is None and _have_own_stamps(series))

@@ -171,8 +171,8 @@ class BagContents(FileExtent):
     recorder : namespace of the recorder, which the attachments are of; None: the bag does not say
     strict : whether every step had to come once and in order; where it had not, a driver was free
         to say anything, and what cannot be used is left out; None: the bag does not say
-    laws : law and gains, in JSON, that the controller said to be in charge -> log time of the first
-        message that says so, ns
+    laws : law and gains, in JSON, that the controller said to be in charge, one after the other,
+        and the log time of the first message that says so, ns
 
     """
 
@@ -187,7 +187,7 @@ class BagContents(FileExtent):
     asked: bool = False
     recorder: str | None = None
     strict: bool | None = None
-    laws: dict[tuple[str, str], int] = field(default_factory=dict)
+    laws: list[tuple[tuple[str, str], int]] = field(default_factory=list)
 
     @property
     def is_of_another(self) -> bool:
@@ -303,6 +303,7 @@ class FileReader:
     def _hear_controller(self, table: MessageTable, index: np.ndarray, channel: int) -> None:
         """Note the laws that the controller of the vehicle that is read says to be in charge."""
         name = f'{(self._contents.namespace or "").rstrip("/")}/{interface.CONTROLLER}'
+        known = self._contents.laws
         for i in index.tolist():
             if name.encode() not in table.message(i):
                 continue
@@ -311,7 +312,8 @@ class FileReader:
                     facts = {one.key: one.value for one in status.values}
                     if status.name == name and LAW_FACT in facts:
                         told = str(facts[LAW_FACT]), str(facts.get(GAINS_FACT))
-                        self._contents.laws.setdefault(told, int(table.log_times[i]))
+                        if not known or known[-1][0] != told:
+                            known.append((told, int(table.log_times[i])))
 
     def _found(
         self, table: MessageTable, members: dict[int, np.ndarray]

@@ -282,7 +282,7 @@ def set_parameter(peer, name: str, value: ParameterValue):
 
 def test_lifecycle_gains_are_taken_while_inactive_only() -> None:
     with program() as peer:
-        peer.add(ControllerNode, [*CONTROLLER, *parameters(autostart=False)])
+        node = peer.add(ControllerNode, [*CONTROLLER, *parameters(autostart=False)])
         peer.listen(topics.DIAGNOSTICS)
         assert state(peer) == 'unconfigured'
         assert change(peer, Transition.TRANSITION_CONFIGURE)
@@ -308,6 +308,7 @@ def test_lifecycle_gains_are_taken_while_inactive_only() -> None:
                     for told in facts if told.get('active') == 'True'}  # fmt: skip
 
         peer.until(lambda: said() == {('cl', 20.0), ('cl', 7.0)}, 'each law, however short')
+        assert node.task == 'tracks cmd_vel with cl in real time'
 
 
 def test_limits_and_timeouts_are_taken_while_inactive_only() -> None:

@@ -258,9 +258,12 @@ class ControllerNode(BulkMixin, LifecycleNode):
         if self._settings.autostart:
             self._autostart()
         if self.exit_code is None:
-            law = self.get_parameter('law').value or 'a law'
-            pace = 'lock-step' if self._settings.lockstep else 'real time'
-            self.begin(f'tracks {topics.CMD_VEL.name} with {law} in {pace}')
+            self.begin(self._task())
+
+    def _task(self) -> str:
+        law = self.get_parameter('law').value or 'a law'
+        pace = 'lock-step' if self._settings.lockstep else 'real time'
+        return f'tracks {topics.CMD_VEL.name} with {law} in {pace}'
 
     def _subscribe(self) -> None:
         p = self._settings
@@ -288,7 +291,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         """
         if not self._build():
             return FAILURE
-        self._active = True
+        self._active, self.task = True, self._task()
         self.graph.facts.update(self._health())
         self.graph.publish_diagnostics()  # a bag has each law, however short it was in charge
         missed, self._missed = self._missed, None

@@ -215,6 +215,22 @@ def test_a_vehicle_with_its_weight_above_turns_over(written):
     assert 'turns over' not in printed(check_vehicle(written(data)))
 
 
+def test_a_complex_pair_of_roll_and_pitch_has_no_frequency(written):
+    data = file_of('bluerov2')
+    data['added_mass'] = np.diag(data['added_mass']).tolist()
+    for i, j in ((0, 3), (1, 4)):  # a body that is no mirror image of itself, and floats up
+        data['added_mass'][i][j] = data['added_mass'][j][i] = 0.4
+    data['hydrostatics']['volume'] *= 1.3
+    document = check_vehicle(written(data))
+    for mode in document['hydrostatics']['modes'].values():
+        assert mode['eigenvalue'] > 0
+        assert mode['natural_frequency'] is mode['period'] is None
+    text = printed(document)
+    assert 'unstable: roll and pitch are a complex pair' in text
+    assert 'turns over' not in text
+    assert 'complex' not in printed(check_vehicle('bluerov2'))
+
+
 def printed(document) -> str:
     out = io.StringIO()
     print_check(document, Console(file=out, width=120))

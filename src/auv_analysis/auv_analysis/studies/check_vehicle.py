@@ -135,7 +135,8 @@ def _hydrostatics(vehicle: Vehicle) -> dict[str, Any]:
 def _pendulum(vehicle: Vehicle) -> dict[str, dict[str, float | None]]:
     """Undamped motion in phi and theta about level: its stiffness M^-1 dg/d(phi, theta), 1/s2.
 
-    The eigenvalue is the square of the natural frequency; negative: the vehicle turns over.
+    The eigenvalue is the square of the natural frequency; negative: the vehicle turns over;
+    the real part of a complex pair, which has no natural frequency: one of its motions grows.
     """
     level = np.zeros(6)
     A, _ = plant_jacobian(vehicle, level, level)
@@ -143,7 +144,7 @@ def _pendulum(vehicle: Vehicle) -> dict[str, dict[str, float | None]]:
     named = {}
     for dof, i in zip(('roll', 'pitch'), np.argsort(-np.abs(modes[0])), strict=True):
         value = float(values[i].real)
-        stable = value > NEGLIGIBLE
+        stable = value > NEGLIGIBLE and not values[i].imag
         omega = float(np.sqrt(value)) if stable else None
         named[dof] = {
             'eigenvalue': value,
@@ -350,6 +351,8 @@ def _hydrostatics_table(found: dict[str, Any], out: Console) -> None:
     for row in rows:
         if row['eigenvalue'] < 0:
             _say(out, f'unstable in {row["dof"]}: the vehicle turns over')
+    if any(row['eigenvalue'] > NEGLIGIBLE and row['period'] is None for row in rows):
+        _say(out, 'unstable: roll and pitch are a complex pair, which grows where damping is small')
 
 
 def _damping_table(found: dict[str, Any], out: Console) -> None:

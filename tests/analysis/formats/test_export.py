@@ -33,6 +33,18 @@ def test_there_and_back(name, place, tmp_path, monkeypatch, capsys):
     assert_allclose(back.D(nu), vehicle.D(nu), rtol=1e-12)
 
 
+@pytest.mark.parametrize('place', ['plugin', 'link'])
+def test_lift_that_feeds_its_own_motion_comes_back(place, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    data = yaml.safe_load(shipped('vehicles', 'lauv').read_text())
+    data['lift'][5][5] = -2.0
+    (tmp_path / 'fed.yaml').write_text(yaml.safe_dump(data))
+    main(['export-vehicle', 'fed.yaml', '--added-mass', place, '--out', 'there.sdf'])
+    main(['import-vehicle', 'there.sdf', '--out', 'back.yaml', '--json'])
+    assert 'feeds its own motion' in str(json.loads(capsys.readouterr().out)['warnings'])
+    assert_allclose(load_vehicle(tmp_path / 'back.yaml').lift, data['lift'])
+
+
 def test_damping_acts_in_gazebo_as_here(tmp_path, capsys):
     """The plugin's own sum, its force turned to FSD, is -D(nu) nu; of lift by surge itself too."""
     data = yaml.safe_load(shipped('vehicles', 'lauv').read_text())

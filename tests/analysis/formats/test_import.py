@@ -395,6 +395,45 @@ def test_products_with_u_of_gazebo_are_lift(imported):
     assert any('nRU, mUW' in text for text in document['traps'])
 
 
+def test_settings_of_the_plugin_that_gazebo_follows_and_we_do_not_are_reported(imported):
+    more = '<disable_coriolis>true</disable_coriolis><default_current>0 0.5 0</default_current>'
+    vehicle, document = imported('a.sdf', sdf(more=more + '<lookup_current_x>u</lookup_current_x>'))
+    assert_same(vehicle, imported('b.sdf', sdf())[0])
+    assert any('disable_coriolis: Gazebo leaves C_A nu out' in text for text in document['traps'])
+    found = [text.partition(':')[0] for text in document['left_out']]
+    assert found == ['default_current', 'lookup_current_x']
+    more = '<disable_coriolis>0</disable_coriolis><default_current>0 0.0 0</default_current>'
+    _, document = imported('a.sdf', sdf(more=more))
+    assert 'coriolis' not in ' '.join(document['traps'])
+    assert document['left_out'] == []
+
+
+def test_a_model_of_classic_gazebo_has_its_body_in_sdf(imported):
+    text = re.sub('(?s)<link name="rexrov/base_link"><inertial>.*?</link>',
+        '<link name="rexrov/base_link"><inertial><pose>0.1 0.2 0.3 0 0 0</pose>'
+        '<mass>1862.87</mass><inertia><ixx>525.39</ixx><ixy>1.44</ixy><ixz>33.41</ixz>'
+        '<iyy>794.20</iyy><iyz>2.6</iyz><izz>691.23</izz></inertia></inertial></link>',
+        URDF, count=1)  # fmt: skip
+    text = re.sub('</?gazebo>', '', text).replace('robot', 'model')
+    vehicle, document = imported('model.sdf', f'<sdf version="1.6">{text}</sdf>')
+    moved = URDF.replace('xyz="0 0 0"', 'xyz="0.1 0.2 0.3"')
+    assert_same(vehicle, imported('a.urdf', moved)[0])
+    assert document['vehicle']['name'] == 'made'
+    turned = text.replace('0.1 0.2 0.3 0 0 0', '0.1 0.2 0.3 0 0 1')
+    with pytest.raises(SystemExit):
+        imported('model.sdf', f'<sdf version="1.6">{turned}</sdf>')
+
+
+def test_bodies_that_a_urdf_fixes_to_that_of_the_vehicle_are_reported(imported):
+    arm = '<link name="arm"><inertial><mass value="40"/></inertial></link><link name="light"/>'
+    joint = (
+        '<joint name="j" type="fixed"><parent link="rexrov/base_link"/><child link="arm"/></joint>'
+    )
+    vehicle, document = imported('a.urdf', URDF.replace('</robot>', f'{arm}{joint}</robot>'))
+    assert_same(vehicle, load_vehicle('rexrov'))
+    assert any('1 other links' in t and '40 kg' in t for t in document['assumed'])
+
+
 BOMB = '<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]><sdf>&b;</sdf>'
 REFUSED = {  # what is wrong -> file, text, options, what the line names
     'a bomb': ('a.sdf', BOMB, [], 'without document type'),

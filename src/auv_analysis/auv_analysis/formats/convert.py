@@ -11,7 +11,7 @@ from auv_analysis.formats.imported import Choices, ImportedVehicle
 from auv_analysis.formats.mesh_import import SUFFIXES, read_mesh
 from auv_analysis.formats.sdf_import import read_gazebo
 from auv_analysis.formats.uuv_urdf import read_uuv, uuv_entries
-from auv_analysis.formats.xml_parts import parse_xml
+from auv_analysis.formats.xml_parts import other_links, parse_xml
 from auv_dynamics.files.errors import InputError, printable
 from auv_dynamics.files.yaml_files import parse_yaml, read_text, yaml_text
 
@@ -48,11 +48,12 @@ def read_vehicle(path: Path, format_: str, choices: Choices) -> tuple[str, Impor
         return found, read_derivatives(text, path, choices)
     if found == 'gazebo':
         return found, read_gazebo(parse_xml(text, path), path, choices)
-    if is_xml:
-        data = uuv_entries(parse_xml(text, path), path)
-    else:
-        data = parse_yaml(text, path, 'uuv_simulator')
-    return found, read_uuv(data, path, choices, path.stem)
+    if not is_xml:
+        return found, read_uuv(parse_yaml(text, path, 'uuv_simulator'), path, choices, path.stem)
+    entries, others = uuv_entries(parse_xml(text, path), path)
+    draft = read_uuv(entries, path, choices, path.stem)
+    other_links(draft, others)
+    return found, draft
 
 
 def _told(text: str, path: Path) -> str:

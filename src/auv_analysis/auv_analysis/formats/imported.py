@@ -111,12 +111,14 @@ class ImportedVehicle:
         """(6, 6) matrix of positive sign of coefficients that follow a sign convention.
 
         The user's choice of sign takes the place of the format's; a diagonal entry that then acts
-        the wrong way is refused, as signs are then not what they were taken for.
+        the wrong way is refused, as signs are then not what they were taken for. Lift may feed
+        its own motion where damping, put before, has shown what the sign is.
         """
         used = self.choices.sign or convention
         turned = -A if used == SNAME else A.copy()
         wrong = np.flatnonzero(np.diagonal(turned) < 0)
-        if len(wrong):
+        damping = [np.diagonal(A) for name, A in self.values.items() if name.startswith('damping.')]
+        if len(wrong) and not (key == 'lift' and np.any(damping)):
             i = int(wrong[0])
             other = POSITIVE if used == SNAME else SNAME
             sign = 'negative, as derivatives are' if used == SNAME else 'positive'

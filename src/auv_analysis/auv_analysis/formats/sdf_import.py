@@ -17,7 +17,7 @@ from auv_analysis.formats.imported import (
     Choices,
     ImportedVehicle,
 )
-from auv_analysis.formats.xml_parts import displaced, link_inertia, numbers
+from auv_analysis.formats.xml_parts import displaced, link_inertia, numbers, other_links
 
 ROWS, COLUMNS = 'xyzkmn', 'UVWPQR'
 COEFFICIENT = re.compile(r'([xyzkmn])(Dot)?([UVWPQR])(abs)?([UVWPQR])?')
@@ -38,12 +38,7 @@ def read_gazebo(root: Element, path: Path, choices: Choices) -> ImportedVehicle:
     draft.name = model.get('name') or path.stem
     link_inertia(draft, link, model)
     others = [other for other in model.iter('link') if other is not link]
-    masses = [other.findtext('inertial/mass') for other in others]
-    total = sum(numbers(text, 1, path, 'link.mass')[0] for text in masses if text)
-    if others:
-        draft.assumed.append(
-            f'{len(others)} other links of the model are no part of the vehicle: {total:g} kg'
-        )
+    other_links(draft, others)
     found = displaced(link, model, path)
     said = 'collision shapes of the link, which Gazebo computes buoyancy from'
     draft.buoyancy(
@@ -51,7 +46,22 @@ def read_gazebo(root: Element, path: Path, choices: Choices) -> ImportedVehicle:
     )
     draft.environment(_density(root, plugin, draft), _gravity(root, draft))
     _coefficients(draft, plugin, link)
+    _settings(draft, plugin)
     return draft
+
+
+def _is_on(plugin: Element, tag: str) -> bool:
+    return (plugin.findtext(tag) or '').strip().lower() in ('true', '1')
+
+
+def _settings(draft: ImportedVehicle, plugin: Element) -> None:
+    """What Gazebo leaves out or adds by the plugin's settings, and a vehicle file does not."""
+    for tag, force in (('disable_added_mass', 'M_A nu_dot'), ('disable_coriolis', 'C_A nu')):
+        if _is_on(plugin, tag):
+            draft.traps.append(f'{tag}: Gazebo leaves {force} out, we do not')
+    for tag in ('default_current', *(f'lookup_current_{axis}' for axis in 'xyz')):
+        if (plugin.findtext(tag) or '').strip(' .0\n\t'):
+            draft.left_out.append(f'{tag}: a current belongs into a scenario, its axes are NED')
 
 
 def _plugin(root: Element, draft: ImportedVehicle) -> Element:
@@ -159,11 +169,9 @@ def _added_mass(
     draft: ImportedVehicle, plugin: Element, link: Element, added: np.ndarray
 ) -> tuple[np.ndarray, str, str]:
     """Matrix as given, the sign convention that it follows, and where it stands."""
-    is_off = (plugin.findtext('disable_added_mass') or '').strip() in ('true', '1')
+    is_off = _is_on(plugin, 'disable_added_mass')
     fluid = link.find('inertial/fluid_added_mass')
     if fluid is None:
-        if is_off and np.any(added):
-            draft.traps.append('disable_added_mass: Gazebo leaves the added mass out, we do not')
         return added, SNAME, 'xDotU ... nDotR of the plugin'
     if np.any(added) and not is_off:
         expected = 'added mass once, in the plugin or in the link'

@@ -13,7 +13,13 @@ from auv_analysis.formats.imported import (
     Choices,
     ImportedVehicle,
 )
-from auv_analysis.formats.xml_parts import ENTRIES, numbers, put_rigid_body
+from auv_analysis.formats.xml_parts import (
+    ENTRIES,
+    mass_of,
+    numbers,
+    pose_in_link,
+    put_rigid_body,
+)
 from auv_dynamics.files.errors import InputError
 
 ALIASES = {
@@ -128,10 +134,6 @@ def _volume(
 
 
 def _matrices(draft: ImportedVehicle, given: Mapping[str, Any]) -> None:
-    forward = 'linear_damping_forward_speed'
-    if forward in given and np.any(A := _matrix(draft, given, forward)):
-        draft.put('lift', draft.positive('lift', A, SNAME, forward), forward)
-        draft.lift_by_abs_u([forward])
     for key, name, convention in (
         ('added_mass', 'added_mass', POSITIVE),
         ('damping.linear', 'linear_damping', SNAME),
@@ -142,18 +144,22 @@ def _matrices(draft: ImportedVehicle, given: Mapping[str, Any]) -> None:
             draft.left_out.append(f'{name}: what is off its diagonal, which uuv_simulator ignores')
             A = np.diag(np.diagonal(A))
         draft.put(key, draft.positive(key, A, convention, name), name)
+    forward = 'linear_damping_forward_speed'
+    if forward in given and np.any(A := _matrix(draft, given, forward)):
+        draft.put('lift', draft.positive('lift', A, SNAME, forward), forward)
+        draft.lift_by_abs_u([forward])
     draft.traps.append(
         'added_mass, damping: they act on velocities that uuv_simulator has turned to FSD, unlike '
         'the inertia: not turned again'
     )
 
 
-def uuv_entries(root: Element, path: Path) -> dict[str, Any]:
-    """Entries of the one link with <hydrodynamic_model>, and of the URDF link of that name.
+def uuv_entries(root: Element, path: Path) -> tuple[dict[str, Any], list[Element]]:
+    """Entries of the one link with <hydrodynamic_model> and its body, and the other bodies.
 
     Parameters
     ----------
-    root : of a URDF, expanded by xacro
+    root : of a URDF, expanded by xacro, or of SDF; the body is the link of the same name
     path : named in errors
 
     """
@@ -162,7 +168,8 @@ def uuv_entries(root: Element, path: Path) -> dict[str, Any]:
         expected = 'one link with <hydrodynamic_model>'
         raise InputError(path, 'hydrodynamic_model', expected, f'{len(links)} of them')
     wet = links[0]
-    entries: dict[str, Any] = {'model': root.get('name') or path.stem}
+    model = [root, *(one for one in root.iter('model') if wet in one.iter('link'))][-1]
+    entries: dict[str, Any] = {'model': model.get('name') or path.stem}
     for child in wet:
         if child.tag == 'hydrodynamic_model':
             entries['hydrodynamic_model'] = {str(part.tag): part.text or '' for part in child}
@@ -171,20 +178,29 @@ def uuv_entries(root: Element, path: Path) -> dict[str, Any]:
     density = root.find('.//fluid_density')
     if density is not None:
         entries['fluid_density'] = density.text or ''
-    return entries | _inertial(root, wet.get('name', ''), path)
-
-
-def _inertial(root: Element, name: str, path: Path) -> dict[str, Any]:
-    named = (link for link in root.iter('link') if link.get('name') == name)
-    found = next((part for link in named if (part := link.find('inertial')) is not None), None)
-    if found is None:
-        expected = f'<inertial> of the link {name or "without name"}, with xacro expanded'
+    bodies = [link for link in model.iter('link') if link.find('inertial') is not None]
+    named = [link for link in bodies if link.get('name') == wet.get('name', '')]
+    if not named:
+        name = wet.get('name') or 'without name'
+        expected = f'<inertial> of the link {name}, with xacro expanded'
         raise InputError(path, 'inertial', expected, None)
-    mass, origin, inertia = (found.find(tag) for tag in ('mass', 'origin', 'inertia'))
+    others = [link for link in bodies if link is not named[0]]
+    return entries | _inertial(named[0], model, path), others
+
+
+def _inertial(link: Element, model: Element, path: Path) -> dict[str, Any]:
+    found = link.find('inertial')
+    assert found is not None
+    origin, inertia = found.find('origin'), found.find('inertia')
     if origin is not None and any(numbers(origin.get('rpy', '0 0 0'), 3, path, 'inertial.origin')):
         raise InputError(path, 'inertial.origin', 'rpy="0 0 0"', origin.get('rpy'))
+    point, R = pose_in_link(found, link, model, path, 'inertial')  # of SDF
+    if np.any(np.eye(3) != R):
+        expected = '<pose> without rotation'
+        raise InputError(path, 'inertial.pose', expected, found.findtext('pose'))
+    entries = {} if inertia is None else {str(part.tag): part.text or '' for part in inertia}
     return {
-        'mass': '' if mass is None else mass.get('value', ''),
-        'center_of_gravity': '0 0 0' if origin is None else origin.get('xyz', '0 0 0'),
-        'inertial': {} if inertia is None else dict(inertia.attrib),
+        'mass': mass_of(found),
+        'center_of_gravity': point.tolist() if origin is None else origin.get('xyz', '0 0 0'),
+        'inertial': entries if inertia is None else entries | dict(inertia.attrib),
     }

@@ -180,6 +180,23 @@ def put_rigid_body(
     draft.values['rigid_body.inertia_reference'] = 'cg'
 
 
+def mass_of(body: Element) -> str:
+    """Text of the mass of an <inertial> or a link, of URDF or SDF."""
+    mass = body.find('mass' if body.tag == 'inertial' else 'inertial/mass')
+    return '' if mass is None else mass.get('value') or mass.text or ''
+
+
+def other_links(draft: ImportedVehicle, others: list[Element]) -> None:
+    """Say what links of a model, be they fixed to that of the vehicle, are left out with it."""
+    total = sum(
+        numbers(text, 1, draft.file, 'link.mass')[0] for text in map(mass_of, others) if text
+    )
+    if others:
+        draft.assumed.append(
+            f'{len(others)} other links of the model are no part of the vehicle: {total:g} kg'
+        )
+
+
 def link_inertia(draft: ImportedVehicle, link: Element, model: Element) -> None:
     """Put mass, centre of gravity and tensor of a link of an SDF model."""
     inertial = link.find('inertial')

@@ -408,6 +408,16 @@ def test_settings_of_the_plugin_that_gazebo_follows_and_we_do_not_are_reported(i
     assert document['left_out'] == []
 
 
+@pytest.mark.parametrize(
+    ('name', 'said'), [('made', False), (' made::base_link', False), ('b', True)]
+)
+def test_a_model_that_gazebo_does_not_let_float_is_reported(imported, name, said):
+    density = '<uniform_fluid_density>'
+    text = sdf().replace(density, f'<enable>{name}</enable>{density}')
+    _, document = imported('a.sdf', text)
+    assert any(text.startswith('enable: ') for text in document['traps']) == said
+
+
 def test_a_model_of_classic_gazebo_has_its_body_in_sdf(imported):
     text = re.sub('(?s)<link name="rexrov/base_link"><inertial>.*?</link>',
         '<link name="rexrov/base_link"><inertial><pose>0.1 0.2 0.3 0 0 0</pose>'
@@ -453,6 +463,8 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
     'damping that feeds': ('a.sdf', sdf().replace('-18', '18'), [], '--sign positive'),
     'two plugins': ('a.sdf', sdf(more='</plugin><plugin><xU>-1</xU>'), [], '2 of them'),
     'no such link': ('a.sdf', sdf().replace('base_link<', 'base<'), [], 'a link of this file'),
+    'URDF with the plugin of Gazebo': (
+        'a.urdf', sdf().replace('model', 'robot'), [], 'gz sdf -p turns URDF into SDF'),
     'no mass of a link': ('a.sdf', sdf().replace('<mass>10</mass>', ''), [], 'link.inertial.mass'),
     'an acceleration times a speed': ('a.sdf', sdf(more='<xDotUU>-3</xDotUU>'), [], '--leave-out'),
     'half a product': ('a.sdf', sdf(more='<xUabs>-3</xUabs>'), [], '--leave-out'),

@@ -47,6 +47,10 @@ def read_gazebo(root: Element, path: Path, choices: Choices) -> ImportedVehicle:
     draft.environment(_density(root, plugin, draft), _gravity(root, draft))
     _coefficients(draft, plugin, link)
     _settings(draft, plugin)
+    water = [one for one in root.iter('plugin') if 'buoyancy' in str(one.attrib).lower()]
+    enabled = [element.text or '' for one in water for element in one.findall('enable')]
+    if enabled and not any(model.get('name') in text.strip().split('::') for text in enabled):
+        draft.traps.append('enable: Gazebo lets other models float and not this one, we do not')
     return draft
 
 
@@ -85,9 +89,8 @@ def _link(
         for link in model.findall('link'):
             if link.get('name') == wanted:
                 return model, link
-    raise draft.refuse(
-        'plugin.link_name', 'a link of this file (write included models out)', name or None
-    )
+    how = 'write included models out' if models else 'gz sdf -p turns URDF into SDF'
+    raise draft.refuse('plugin.link_name', f'a link of this file ({how})', name or None)
 
 
 def _density(root: Element, plugin: Element, draft: ImportedVehicle) -> tuple[float, str] | None:

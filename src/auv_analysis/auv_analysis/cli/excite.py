@@ -124,8 +124,8 @@ def bounds_of(options: argparse.Namespace, vehicle: Vehicle) -> Bounds:
     if options.limit is not None:
         wrench = np.broadcast_to(np.array(options.limit), 6)
     elif vehicle.thrusters is not None:
-        alone = [dof not in vehicle.thrusters.unactuated() for dof in DOFS]
-        wrench = SHARE * vehicle.thrusters.largest() * alone
+        driven = [dof not in vehicle.thrusters.unactuated() for dof in DOFS]
+        wrench = SHARE * vehicle.thrusters.alone().min(axis=0) * driven
     else:
         nu = np.repeat([options.speed, rate], 3)
         tilted = np.array([0.0, 0.0, 0.0, 0.5 * TILT, 0.5 * TILT, 0.0])

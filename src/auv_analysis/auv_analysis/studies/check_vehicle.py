@@ -212,12 +212,7 @@ def _munk(vehicle: Vehicle) -> str | None:
 def _thrusters(thrusters: Thrusters) -> dict[str, Any]:
     """What is there, and how much of each degree of freedom it gives; None where it gives none."""
     lost = thrusters.unactuated()
-
-    def largest(axis: np.ndarray) -> list[float]:
-        far = axis / np.finfo(float).eps  # beyond any limit
-        return [float(abs(axis @ thrusters.allocate(tau)[1])) for tau in (-far, far)]
-
-    axes = zip(DOFS, np.eye(6), strict=True)
+    largest = zip(DOFS, thrusters.alone().T.tolist(), strict=True)
     return {
         'names': list(thrusters.names),
         'matrix': thrusters.matrix.tolist(),
@@ -225,7 +220,7 @@ def _thrusters(thrusters: Thrusters) -> dict[str, Any]:
         'forward': thrusters.forward.tolist(),
         'rank': thrusters.rank,
         'unactuated': {dof: list(others) for dof, others in lost.items()},
-        'largest': {dof: None if dof in lost else largest(axis) for dof, axis in axes},
+        'largest': {dof: None if dof in lost else both for dof, both in largest},
         'rotors': [_rotor(rotor) for rotor in thrusters.rotors],
     }
 

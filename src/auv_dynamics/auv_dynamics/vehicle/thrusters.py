@@ -116,6 +116,12 @@ class Thrusters:
         astern = np.where(self.matrix > 0, self.matrix * self.reverse, -self.matrix * self.forward)
         return np.maximum(ahead.sum(axis=1), astern.sum(axis=1))
 
+    def alone(self) -> np.ndarray:
+        """(2, 6) largest wrench of each axis without the others, N and N m: astern, ahead."""
+        far = 1.0 / np.finfo(float).eps  # N, N m: beyond any limit
+        both = [[self.allocate(way * axis)[1] @ axis for axis in np.eye(6)] for way in (-far, far)]
+        return np.abs(both)
+
     def unactuated(self) -> dict[str, tuple[str, ...]]:
         """Degrees of freedom without a wrench of their own, and what each comes along with.
 

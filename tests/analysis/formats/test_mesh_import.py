@@ -226,6 +226,13 @@ def test_what_the_user_gives_is_taken_and_the_vehicle_by_other_commands(
 
 
 @pytest.mark.usefixtures('dry')
+def test_a_hull_about_its_origin_is_level(imported):
+    hull = trimesh.creation.cylinder(radius=0.2, height=1.0, sections=17)
+    vehicle, _ = imported(hull, mass=125.0)
+    assert vehicle.r_B.tolist() == vehicle.r_G.tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.usefixtures('dry')
 def test_the_inertia_is_as_it_was_given_or_else_that_of_the_hull(imported):
     given = '--inertia', '110', '300', '400', '1', '5', '2', '--products', 'tensor'
     options = *given, '--inertia-reference', 'co', '--gravity', '3.71', '--cog', '0', '0', '0.1'

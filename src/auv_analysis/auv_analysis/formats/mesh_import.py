@@ -42,6 +42,7 @@ SAFETY = 2.0  # error estimate in differences between two levels
 NOISE = 0.1  # of two errors of the diagonal, the least that the entry of both has
 PANELS, TOLERANCE = 5500, 0.02
 WORST = 0.2  # error with which there is a file all the same
+ROUNDING = 1e-7  # of the hull's length: of the single precision of STL
 DIGITS = 10  # significant, of what is written: the loader asks for eigenvalues above -1e-9
 LETTERS = 'XYZKMN'
 
@@ -60,7 +61,8 @@ def read_mesh(path: Path, choices: Choices) -> ImportedVehicle:
     draft.environment(None, (GRAVITY, 'assumed'))
     density = draft.values['environment.water_density']
     hull = _in_body_frame(draft, _united(draft, _loaded(path, trimesh), trimesh), density / mass)
-    volume, r_B = float(hull.volume), np.asarray(hull.center_mass)
+    volume, r_B = float(hull.volume), np.array(hull.center_mass)
+    r_B[np.abs(r_B) < ROUNDING * hull.extents.max()] = 0.0
     draft.put('rigid_body.mass', mass, 'given by --mass')
     draft.put('hydrostatics.volume', _rounded(volume), 'of the mesh')
     draft.put('hydrostatics.center_of_buoyancy', _rounded(r_B), 'centroid of the mesh')

@@ -145,9 +145,10 @@ def test_without_f_nothing_is_said_of_its_error(tmp_path) -> None:
         bag.add(f'/{role}', made.__msgtype__, k * STEP, serialized(made))
     run = load_run(bag.close(), vehicle='rexrov')
     assert np.isnan(run.disturbance_estimate).all()
+    np.testing.assert_array_equal(run.disturbance, np.full((4, 6), 5.0))
     assert not run.knows_disturbance
     assert summarize(run)['lumped_error'] == {'rms': None, 'max_after_2s': None}
-    assert run.notes == ('disturbance_estimate: no messages: f is unknown, F not used',)
+    assert run.notes == ('disturbance_estimate: no messages: f and its error are unknown',)
     assert not digest(run).estimates
 
 

@@ -160,7 +160,7 @@ def notes_on_missing(contents: BagContents, kinds: set[str], topics: set[str]) -
     counts = (
         (interface.GROUND_TRUTH, {'sensors', *SENSING}, 'what was measured counts as the truth'),
         (interface.WRENCH_APPLIED, {'actuators', *ACTING}, 'the command counts as applied'),
-        (interface.DISTURBANCE_ESTIMATE, {interface.DISTURBANCE}, 'f is unknown, F not used'),
+        (interface.DISTURBANCE_ESTIMATE, {interface.DISTURBANCE}, 'f and its error are unknown'),
     )
     missing = [entry for entry in counts if entry[0] not in topics and there & entry[1]]
     return [f'{topic}: no messages: {instead}' for topic, _, instead in missing]

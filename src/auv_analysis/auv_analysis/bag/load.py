@@ -200,10 +200,7 @@ def _gaps(ns: np.ndarray) -> tuple[tuple[float, float], ...]:
 
 
 def _run(ns: np.ndarray, values: dict[str, np.ndarray], facts: dict[str, Any], whole: float) -> Run:
-    """Run of complete steps; NaN is what was not recorded, nu_d_dot then the slope of nu_d.
-
-    Where f was not, F alone says nothing of the error of an estimate, and is left out.
-    """
+    """Run of complete steps; NaN is what was not recorded, nu_d_dot then the slope of nu_d."""
     x = values.get(interface.GROUND_TRUTH, values[interface.ODOM])
     t = ((rows_of(ns, here) - ns[0]) / interface.NANOSECONDS for here in slices(len(ns)))
     unknown = np.broadcast_to(np.nan, (len(ns), 6))
@@ -211,7 +208,6 @@ def _run(ns: np.ndarray, values: dict[str, np.ndarray], facts: dict[str, Any], w
     if nu_d_dot is None:
         nu_d_dot = gathered(_slopes(nu_d, facts['step']), whole)
     sensing = interface.GROUND_TRUTH in values
-    f = values.get(interface.DISTURBANCE_ESTIMATE)
     return Run(
         **facts,
         t=gathered(t, whole),
@@ -220,8 +216,8 @@ def _run(ns: np.ndarray, values: dict[str, np.ndarray], facts: dict[str, Any], w
         nu_d=nu_d,
         nu_d_dot=nu_d_dot,
         tau=values[interface.WRENCH],
-        disturbance=None if f is None else values.get(interface.DISTURBANCE),
-        disturbance_estimate=unknown if f is None else f,
+        disturbance=values.get(interface.DISTURBANCE),
+        disturbance_estimate=values.get(interface.DISTURBANCE_ESTIMATE, unknown),
         measured=values[interface.ODOM][:, 7:] if sensing else None,
         applied=values.get(interface.WRENCH_APPLIED),
     )

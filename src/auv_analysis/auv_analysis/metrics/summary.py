@@ -125,8 +125,8 @@ def if_known(known: np.ndarray, values: Sequence[float | None]) -> list[float | 
 
 
 def lumped_error(run: Run) -> np.ndarray | None:
-    """W = f - F in the body frame, (n + 1, 6) in N, N m; None where F is not known."""
-    return None if run.disturbance is None else run.disturbance_estimate - run.disturbance
+    """W = f - F in the body frame, (n + 1, 6) in N, N m; None where one of them is not known."""
+    return run.disturbance_estimate - run.disturbance if run.knows_disturbance else None
 
 
 def band_of(peak: np.ndarray) -> np.ndarray:

@@ -219,7 +219,7 @@ def signals(run: Run, model: ControlModel) -> dict[str, np.ndarray]:
             found |= {name: wrench, 'least': wrench - 2.0 * error, 'most': wrench + 2.0 * error}
     if run.applied is not None:
         found['applied'] = run.applied
-    if run.disturbance is not None:
+    if run.knows_disturbance:
         found |= {'F': run.disturbance, 'lumped_error': run.disturbance_estimate - run.disturbance}
     return found
 

@@ -104,7 +104,7 @@ class RunInfo(ABC):
 
     @property
     def knows_disturbance(self) -> bool:
-        """Whether the lumped uncertainty F is known."""
+        """Whether the lumped uncertainty F and the estimate f are known, and w = f - F."""
         return self.extent.knows_disturbance
 
     @property
@@ -244,7 +244,8 @@ class Run(RunInfo):
             float(self.t[-1]),
             sensing=self.measured is not None,
             acting=self.applied is not None,
-            knows_disturbance=self.disturbance is not None,
+            knows_disturbance=self.disturbance is not None
+            and not np.isnan(self.disturbance_estimate[0]).any(),
             knows_setpoint=not np.isnan(self.nu_d[0]).all(),
             knows_wrench=not np.isnan(self.tau[0]).all(),
             unknown=tuple(unknown),

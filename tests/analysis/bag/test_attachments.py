@@ -83,6 +83,14 @@ def test_a_law_that_was_changed_before_the_first_wrench_was_never_in_charge() ->
     assert (own['law'], own['gains.k_D']) == ('cl', [1.0])
 
 
+def test_a_controller_whose_parameters_no_file_has_says_its_law_and_gains() -> None:
+    for data in ({}, {'params': {'/**': {'ros__parameters': {'step': 0.01}}}}):
+        bag = contents(**data)
+        bag.laws = [(told('cl', 5.0), SECOND)]
+        own = attachments.parameters_of(bag, BAG)['controller_node']
+        assert (own['law'], own['gains.k_D'], bag.notes) == ('cl', [5.0], [])
+
+
 def test_a_control_period_is_a_positive_number() -> None:
     assert attachments.step_of({}, BAG) is None
     assert attachments.step_of({'plant_node': {}}, BAG) is None

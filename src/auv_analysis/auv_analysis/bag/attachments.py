@@ -36,9 +36,7 @@ def parameters_of(contents: BagContents, bag: Path) -> Parameters:
     no other, since whatever names no namespace is of the recorder's vehicle. Law and gains are
     those that the controller says it has: they may have changed since the file was written.
     """
-    text = contents.attachments.get('params.yaml')
-    if text is None:
-        return {}
+    text = contents.attachments.get('params.yaml', '{}')
     file = f'{bag}: params.yaml'
     found: Parameters = {}
     ranks: dict[str, int] = {}
@@ -47,8 +45,8 @@ def parameters_of(contents: BagContents, bag: Path) -> Parameters:
         rank = OWN if space == own else int(not space or '*' in space)
         if rank >= ranks.get(node, OWN if contents.is_of_another else 0):
             found[node], ranks[node] = values, rank
-    if CONTROLLER in found and contents.laws:
-        found[CONTROLLER] = _in_charge(found[CONTROLLER], contents)
+    if contents.laws:
+        found[CONTROLLER] = _in_charge(found.get(CONTROLLER, {}), contents)
     return found
 
 
@@ -75,9 +73,10 @@ def _in_charge(controller: dict[str, Any], contents: BagContents) -> dict[str, A
     if not isinstance(gains, dict):
         return controller
     told = {'law': law, **{f'{GAINS}{name}': value for name, value in gains.items()}}
-    if told == {name: controller[name] for name in written if controller[name]}:
-        return controller
-    contents.notes.append('law and gains are those that the controller says, not of params.yaml')
+    if written and told != {name: controller[name] for name in written if controller[name]}:
+        contents.notes.append(
+            'law and gains are those that the controller says, not of params.yaml'
+        )
     return {**others, **told}
 
 

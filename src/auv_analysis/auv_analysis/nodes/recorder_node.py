@@ -147,7 +147,8 @@ class RecorderNode(BulkNode):
         self._ledger = StepLedger(self._counted, grid.step_ns, p.strict)
         self._publications = PublicationLedger(p.strict)
         self._time = GraphClock(self, p.strict)
-        self._newest = {topics.LUMPED_ERROR.name: -1, topics.CLOCK.name: -1}  # stamps, ns
+        awaited = (topics.CLOCK, *topics.ANALYSIS_TOPICS)
+        self._newest = {topic.name: -1 for topic in awaited}  # stamps, ns
         self._heard = 0.0  # steady s of the last step
         self._reported = -1
         self._complaints: set[str] = set()
@@ -254,7 +255,7 @@ class RecorderNode(BulkNode):
         clock has come to the last step. In lock-step it is the clock.
         """
         due, newest = self._last_due, self._newest
-        analysed = due is None or newest[topics.LUMPED_ERROR.name] >= due
+        analysed = due is None or all(newest[t.name] >= due for t in topics.ANALYSIS_TOPICS)
         late = time.monotonic() - self._heard > PATIENCE
         if self._ledger.complete < last or not analysed:
             reached = self._ledger.reaches(last, newest[topics.CLOCK.name])

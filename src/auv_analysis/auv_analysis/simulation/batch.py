@@ -5,6 +5,7 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any, NamedTuple
@@ -35,6 +36,7 @@ from auv_dynamics.kernel.lanes import (
 from auv_dynamics.plant.actuators import memory
 from auv_dynamics.plant.devices import history_shape
 from auv_dynamics.plant.plant import SIZE
+from auv_gvc_controller.control.sampled import user_law
 from auv_gvc_controller.laws.law import SHIPPED
 
 Known = Callable[[np.ndarray], Tables]  # stage times t (T, s) of the next block -> its tables
@@ -282,7 +284,7 @@ def _run_part(job: _Job, blocks: range, *, trial: bool = False) -> None:
     known = job.tables or (_shared(batch, lanes) if batch.shared else _own(batch, lanes, blocks))
     for grid, tables in known:
         steps = grid._replace(t=grid.t[:0]) if trial else grid
-        with np.errstate(all='ignore'):
+        with np.errstate(all='ignore'), nullcontext() if trial else user_law(loop.gains):
             job.kernel.run(loop, tables, steps, tableau, motion, work, record, 0, count, lanes)
         if trial:
             return

@@ -6,6 +6,7 @@ import shutil
 import sys
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 from helpers.doc_blocks import ROOT
@@ -15,9 +16,13 @@ from helpers.patience import patience
 NOTEBOOKS = sorted((ROOT / 'docs' / 'notebooks').glob('*.ipynb'))
 
 
+def code_cells(path: Path) -> list[dict[str, Any]]:
+    return [cell for cell in json.loads(path.read_text())['cells'] if cell['cell_type'] == 'code']
+
+
 @pytest.mark.parametrize('path', NOTEBOOKS, ids=lambda path: path.stem)
 def test_kept_without_outputs(path: Path) -> None:
-    cells = [cell for cell in json.loads(path.read_text())['cells'] if cell['cell_type'] == 'code']
+    cells = code_cells(path)
     assert cells
     for cell in cells:
         assert cell['outputs'] == []
@@ -27,8 +32,9 @@ def test_kept_without_outputs(path: Path) -> None:
 @pytest.mark.parametrize('path', NOTEBOOKS, ids=lambda path: path.stem)
 def test_takes_only_names_of_ours_that_exist(path: Path) -> None:
     """Each is run by `make docs` alone, and would be found broken late."""
-    cells = [cell for cell in json.loads(path.read_text())['cells'] if cell['cell_type'] == 'code']
-    nodes = [node for cell in cells for node in ast.walk(ast.parse(''.join(cell['source'])))]
+    nodes = [
+        node for cell in code_cells(path) for node in ast.walk(ast.parse(''.join(cell['source'])))
+    ]
     taken = [ast.unparse(node) for node in nodes if isinstance(node, ast.ImportFrom)]
     taken = [line for line in taken if line.startswith('from auv_')]
     assert taken

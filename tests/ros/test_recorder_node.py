@@ -132,10 +132,10 @@ def test_the_analysis_of_the_last_step_is_waited_for(tmp_path: Path) -> None:
             publish_step(peer, k)
         acknowledged(peer, 20)
         for k in (12, 18):
+            peer.spin(0.3)
             for topic in reversed(topics.ANALYSIS_TOPICS):
                 assert processes['recorder_node'].poll() is None
                 peer.publish(topic, of_analysis(topic, k * STEP))
-            peer.spin(0.3)
         peer.until(lambda: processes['recorder_node'].poll() is not None, 'the end')
         assert processes['recorder_node'].returncode == 0
     assert read_bag(tmp_path / 'bag', decode=False).counts[f'/{topics.LUMPED_ERROR.name}'] == 2

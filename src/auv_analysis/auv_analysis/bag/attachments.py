@@ -15,7 +15,7 @@ from auv_dynamics.files.yaml_files import check, parse_yaml
 from auv_dynamics.plant.faults import ACTING, SENSING
 from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.ros import interface
-from auv_dynamics.ros.interface import CONTROLLER, NANOSECONDS, WRENCH
+from auv_dynamics.ros.interface import CONTROLLER, GAIN, NANOSECONDS, WRENCH
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import load_vehicle, vehicle_from_dict
 from auv_gvc_controller.laws.law import is_unasked, make_gains
@@ -23,7 +23,6 @@ from auv_gvc_controller.laws.law import is_unasked, make_gains
 NAME = re.compile('[A-Za-z0-9][A-Za-z0-9_.+-]{0,99}')
 LAW = re.compile(r'[A-Za-z_][\w.]*:[A-Za-z_]\w*', re.ASCII)  # module:Class
 UNFIT = re.compile('[^A-Za-z0-9_.+-]+')
-GAINS = 'gains.'  # begin of the names of their parameters
 UNKNOWN = 'unknown'  # law of a bag without params.yaml
 Parameters = dict[str, dict[str, Any]]  # of nodes, by their names
 OWN = 2  # rank of parameters for the namespace; 1: for any, 0: for another
@@ -52,7 +51,7 @@ def parameters_of(contents: BagContents, bag: Path) -> Parameters:
 
 def _in_charge(controller: dict[str, Any], contents: BagContents) -> dict[str, Any]:
     """Parameters of a controller with the law and gains in charge; of several, with none."""
-    written = {name for name in controller if name == 'law' or name.startswith(GAINS)}
+    written = {name for name in controller if name == 'law' or name.startswith(GAIN)}
     others = {name: value for name, value in controller.items() if name not in written}
     wrenches = [ns for topic, (ns, _) in contents.messages.items() if role_of(topic) == WRENCH]
     begin = min((int(ns.min()) for ns in wrenches), default=0)
@@ -72,7 +71,7 @@ def _in_charge(controller: dict[str, Any], contents: BagContents) -> dict[str, A
         return controller
     if not isinstance(gains, dict):
         return controller
-    told = {'law': law, **{f'{GAINS}{name}': value for name, value in gains.items()}}
+    told = {'law': law, **{f'{GAIN}{name}': value for name, value in gains.items()}}
     if written and told != {name: controller[name] for name in written if controller[name]}:
         contents.notes.append(
             'law and gains are those that the controller says, not of params.yaml'
@@ -119,21 +118,21 @@ def law_and_gains(controller: dict[str, Any], bag: Path) -> tuple[str, dict[str,
     """Law and gains, from the parameters of the controller node; no gains of an unasked law."""
     gains = {}
     for key, value in controller.items():
-        if key.startswith(GAINS):
+        if key.startswith(GAIN):
             one = isinstance(value, list) and len(value) == 1
-            gains[key.removeprefix(GAINS)] = value[0] if one else value
+            gains[key.removeprefix(GAIN)] = value[0] if one else value
     law = controller.get('law')
     file = f'{bag}: params.yaml'
     if law is None:
         return UNKNOWN, {}  # a bag that somebody else recorded says nothing of it
     if is_unasked(law):
         if not LAW.fullmatch(law):
-            raise InputError(file, 'controller_node', 'a law, shipped or module:Class', law)
+            raise InputError(file, CONTROLLER, 'a law, shipped or module:Class', law)
         return law, {}
     try:
         make_gains(law, gains)
     except ValueError as error:
-        raise InputError(file, 'controller_node', str(error), 'another law or gain') from None
+        raise InputError(file, CONTROLLER, str(error), 'another law or gain') from None
     return law, gains
 
 

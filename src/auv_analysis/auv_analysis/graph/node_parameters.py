@@ -16,7 +16,7 @@ from auv_gvc_controller.control.setpoint import SetpointSettings
 from auv_gvc_controller.control.setpoint_buffer import SAME
 from auv_gvc_controller.control.settings import EXACT, LATEST, ControllerSettings
 
-PLANT, SETPOINT, CONTROLLER = 'plant_node', 'setpoint_node', 'controller_node'
+PLANT, SETPOINT, CONTROLLER = 'plant_node', 'setpoint_node', interface.CONTROLLER
 ANALYSIS, RECORDER = 'analysis_node', interface.RECORDER
 EVERY = 10  # steps between live analysis samples
 WINDOW = 2000  # steps that the plant may be ahead of the recorder
@@ -86,7 +86,7 @@ def node_parameters(
     horizon, attached = HORIZON if lockstep else 0, (attachments or {}).items()
     known, gains = scenario.controller(controller), scenario.gain_values(controller)
     law = {'law': known['law'], 'vehicle': vehicle, 'autostart': True}
-    law |= {f'gains.{name}': numbers(value) for name, value in gains.items()}
+    law |= {f'{interface.GAIN}{name}': numbers(value) for name, value in gains.items()}
     settings: dict[str, Any] = {
         PLANT: _plant(scenario, vehicle, nodes, lockstep),
         SETPOINT: SetpointSettings(*grid, horizon, scenario.data['setpoint']),

@@ -20,7 +20,7 @@ from auv_dynamics.files.errors import InputError, first_line
 from auv_dynamics.files.nearest import one_of as nearest_of
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.endpoints import why_silent
-from auv_dynamics.ros.interface import GAINS_FACT, LAW_FACT, NANOSECONDS
+from auv_dynamics.ros.interface import CONTROLLER, GAIN, GAINS_FACT, LAW_FACT, NANOSECONDS
 from auv_dynamics.ros.node_interface import (
     ERROR,
     OK,
@@ -42,7 +42,6 @@ from auv_gvc_controller.laws.law import SHIPPED, is_unasked, law_class, make_gai
 from auv_gvc_controller.laws.model import control_model
 
 GAINS = {gain for law in SHIPPED.values() for gain in law._fields}
-WRITABLE = 'gains.'
 SETTINGS = {name_of(entry) for entry in fields(ControllerSettings) if entry.metadata}
 FIXED = {'setpoint_pairing', 'setpoint_acceleration'}  # which decide what is heard
 LAWS = f'{", ".join(SHIPPED)} or module:Class of your own'
@@ -54,7 +53,7 @@ class ControllerParameters:
     def __init__(self, node: Any):
         self._node = node
         self._named = declare(node, 'law', str, '', LAWS, writable=True)
-        names = {*(f'{WRITABLE}{gain}' for gain in GAINS), *given(node, WRITABLE)}
+        names = {*(f'{GAIN}{gain}' for gain in GAINS), *given(node, GAIN)}
         for name in sorted(names):
             text = '1 number (times identity), 6 (diagonal) or 36 (row-major)'
             declare(node, name, list[float], None, text, writable=True)
@@ -99,7 +98,7 @@ class ControllerParameters:
             try_law(gains, control_model(vehicle))
         except ValueError as error:
             gain, expected, found = refusal(error)
-            key = f'{WRITABLE}{gain}' if gain else 'law'
+            key = f'{GAIN}{gain}' if gain else 'law'
             raise InputError(name, key, expected, found) from None
         self.told = {LAW_FACT: law, GAINS_FACT: json.dumps(values, sort_keys=True)}
         self.settings = self._present({})
@@ -113,9 +112,9 @@ class ControllerParameters:
 
     def _gains(self, law: str) -> dict[str, Any]:
         values = {}
-        given_here = (name.removeprefix(WRITABLE) for name in given(self._node, WRITABLE))
+        given_here = (name.removeprefix(GAIN) for name in given(self._node, GAIN))
         for gain in {*law_class(law)._fields, *given_here}:
-            parameter = self._node.get_parameter_or(f'{WRITABLE}{gain}', None)
+            parameter = self._node.get_parameter_or(f'{GAIN}{gain}', None)
             if parameter is not None and parameter.type_ != Parameter.Type.NOT_SET:
                 values[gain] = list(parameter.value)
         return values
@@ -124,7 +123,7 @@ class ControllerParameters:
         """Answer a change of parameters: law, gains and settings are taken while inactive only."""
         changed = {one.name: one.value for one in parameters if one.name in SETTINGS}
         for parameter in parameters:
-            of_law = parameter.name == 'law' or parameter.name.startswith(WRITABLE)
+            of_law = parameter.name == 'law' or parameter.name.startswith(GAIN)
             if not of_law and parameter.name not in changed:
                 continue
             if active:
@@ -233,7 +232,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
     latency_critical = True
 
     def __init__(self, **options: Any):
-        super().__init__('controller_node', **options)
+        super().__init__(CONTROLLER, **options)
         self.graph = NodeInterface(self)
         self._settings = ControllerParameters(self)
         refuse_unknown(self)
@@ -295,7 +294,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         self.graph.facts.update(self._health())
         self.graph.publish_diagnostics()  # a bag has each law, however short it was in charge
         missed, self._missed = self._missed, None
-        if missed is not None and self._settings.lockstep:
+        if missed is not None:
             try:
                 self._on_odometry(*missed)
             except ValueError as error:
@@ -332,7 +331,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
     def _on_odometry(self, ns: int, x: tuple[float, ...]) -> None:
         if self._active:
             self._say(self._controller.odometry(ns, x, self._now()))
-        else:
+        elif self._settings.lockstep:
             self._missed = ns, x
 
     def _now(self) -> Now:

@@ -19,15 +19,15 @@ class ComputedTorque(NamedTuple):
     def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
         """Tau = M (nu_d_dot + k_P nu_err + k_I z) + C(nu) nu + D(nu) nu + g(eta)."""
         vehicle = model.dynamics
-        nu_err = np.subtract(nu_d, nu)
+        nu_err = np.array(nu_d) - np.array(nu)
         k_P, k_I = gains.k_P.reshape(6, 6), gains.k_I.reshape(6, 6)
-        tau = vehicle.M.reshape(6, 6) @ (nu_d_dot + k_P @ nu_err + k_I @ state)
-        tau += coriolis(vehicle.M, nu, nu)
-        tau += damping(vehicle, nu, nu)
-        tau += restoring(vehicle, attitude)
+        tau = vehicle.M.reshape(6, 6) @ (np.array(nu_d_dot) + k_P @ nu_err + k_I @ state)
+        tau += np.array(coriolis(vehicle.M, nu, nu))
+        tau += np.array(damping(vehicle, nu, nu))
+        tau += np.array(restoring(vehicle, attitude))
         return tau, np.zeros(6)  # the wrench, and its adaptive part
 
     @staticmethod
     def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
         """z_dot = nu_err."""
-        return np.subtract(nu_d, nu)
+        return np.array(nu_d) - np.array(nu)

@@ -245,18 +245,19 @@ def plain(function: Function) -> Function:
     return getattr(function, 'py_func', function)
 
 
-def specialised(argument: str) -> Decorator:
+def specialised(argument: str, method: Callable[[Any, str], Any] = getattr) -> Decorator:
     """Let a generic function be compiled for the class of one of its arguments.
 
     The decorated function says in Python what it does: call the static method of its own name of
-    the class of `argument`, a named tuple. Under numba, the method itself is compiled.
+    the class of `argument`, a named tuple. Under numba, the method itself is compiled, or what
+    `method` makes of class and name.
     """
 
     def decorate(generic: Function, /) -> Function:
         names = generic.__code__.co_varnames[: generic.__code__.co_argcount]
         position = names.index(argument)
         return overloaded(
-            generic, lambda *types: getattr(types[position].instance_class, generic.__name__)
+            generic, lambda *types: method(types[position].instance_class, generic.__name__)
         )
 
     return decorate

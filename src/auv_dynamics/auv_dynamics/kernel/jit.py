@@ -20,6 +20,7 @@ from numba.core.typed_passes import NativeLowering
 from numba.extending import intrinsic, overload, register_jitable
 from numba.np import linalg
 from numba.np.arrayobj import make_array, populate_array
+from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from auv_dynamics.kernel.compile import cache_folder, is_private
 from auv_dynamics.kernel.lanes import align_stack, of_block
@@ -46,6 +47,7 @@ with _without_asking_for_blas():
 types: Any = numba.types  # its own annotations know no named tuples
 FOLDER = cache_folder()
 KEPT = is_private(FOLDER)
+WRONG_LENGTH = 'another number of values than expected'
 if not KEPT:
     text = f'warning: {FOLDER}: not yours alone: compiled code is neither kept nor loaded'
     print(text, file=sys.stderr, flush=True)
@@ -90,6 +92,7 @@ INNER: Any = {
 }
 NUMBERS = types.Number, types.Boolean
 inlined: Any = register_jitable(**INNER)
+allocating: Any = register_jitable(**INNER | {'_nrt': True})
 uncached: Any = numba.njit(nogil=True, **OPTIONS)
 
 
@@ -99,6 +102,25 @@ def overloaded(function: Any, choose: Callable[..., Any], options: dict[str, Any
     overload(function, jit_options=INNER | options, strict=False)(
         lambda *types: choose(*types)  # noqa: PLW0108  numba looks at its code
     )
+
+
+def in_numbers(count: int) -> Any:
+    """What turns a tuple or a 1-D array of so many numbers into a tuple; ValueError for another."""
+
+    def fixed(values: Any) -> Any: ...
+
+    def of_array(values: Any) -> Any:
+        if len(values) != count:
+            raise ValueError(WRONG_LENGTH)
+        return to_fixed_tuple(values, count)  # type: ignore[call-arg]
+
+    def choose(values: Any) -> Any:
+        if isinstance(values, types.BaseTuple):
+            return (lambda values: values) if len(values) == count else None
+        return of_array if isinstance(values, types.Array) and values.ndim == 1 else None
+
+    overloaded(fixed, choose, {'_nrt': True})
+    return fixed
 
 
 class _Place:

@@ -12,6 +12,7 @@ from auv_dynamics.kernel.compile import (
     JITTED,
     compiled,
     helper,
+    load,
     specialised,
 )
 from auv_dynamics.kernel.lanes import anywhere, select
@@ -28,7 +29,26 @@ from auv_gvc_controller.laws.model import ControlModel
 ROUNDING = 1e-9
 
 
-@specialised('gains')
+def _method(law: Any, name: str) -> Any:
+    """What numba compiles of a law: a user's may make arrays, and gives tuples to the kernel."""
+    given = getattr(law, name)
+    if law in SHIPPED.values():
+        return given
+    jit = load()
+    method, six, states = jit.allocating(given), jit.in_numbers(6), jit.in_numbers(law.STATES)
+
+    def both(*arguments: Any) -> tuple[Numbers, Numbers]:
+        tau, f = method(*arguments)
+        return six(tau), six(f)
+
+    def rate(*arguments: Any) -> Numbers:
+        return states(method(*arguments))
+
+    inner = jit.allocating(both if name == 'wrench' else rate)
+    return lambda *arguments: inner(*arguments)  # noqa: PLW0108  numba looks at its code
+
+
+@specialised('gains', _method)
 def wrench(
     t: float, nu: Vector, attitude: Vector, nu_d: Vector, nu_d_dot: Vector, state: Vector,
     gains: Any, model: ControlModel,
@@ -39,7 +59,7 @@ def wrench(
         return _numbers('tau', tau, 6), _numbers('f', f, 6)
 
 
-@specialised('gains')
+@specialised('gains', _method)
 def state_rate(
     t: float, nu: Vector, attitude: Vector, nu_d: Vector, nu_d_dot: Vector, state: Vector,
     gains: Any, model: ControlModel,

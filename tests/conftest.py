@@ -37,8 +37,9 @@ settings.load_profile('tests')
 
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # in the background of a shell
     signal.signal(signal.SIGINT, signal.default_int_handler)  # what tests interrupt inherits it
-if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:  # by `nohup`
-    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+for number in (signal.SIGQUIT, signal.SIGHUP):  # the latter by `nohup`
+    if signal.getsignal(number) == signal.SIG_IGN:
+        signal.signal(number, signal.SIG_DFL)
 
 
 if os.environ.get('AUV_GVC_TESTS') != str(os.getppid()):  # no worker of xdist

@@ -565,6 +565,7 @@ def test_interrupt_ends_simulate_whenever_it_comes(folder) -> None:
         except subprocess.TimeoutExpired:
             process.send_signal(signal.SIGINT)
             _, errors = process.communicate(timeout=patience(60))
-            assert process.returncode == 1 or i > 34, errors  # it may have come to its end
+            # Python itself ends by the signal where it came inside of code that `exec` runs
+            assert process.returncode in (1, -signal.SIGINT) or i > 34, errors  # or at its end
             assert 'Traceback' not in errors
             assert json.loads((folder / 'runs/case1/summary.json').read_text())

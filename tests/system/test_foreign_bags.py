@@ -111,7 +111,7 @@ def test_installed_command_analyses_it(bag, tmp_path) -> None:
     assert all(error > 0 for error in summary['unexplained']['error_rms'])
     assert summary['velocity_error']['rms'] is not None
     report = (tmp_path / 'out' / 'report.html').read_text()
-    for words in ('Unexplained wrench of dive', 'enu_flu as told', 'recorded by another system'):
+    for words in ('Unexplained wrench, dive', 'enu_flu as told', 'recorded by another system'):
         assert words in report
     assert (tmp_path / 'out' / 'figures' / 'unexplained_dive.pdf').exists()
 

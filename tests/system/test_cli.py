@@ -565,7 +565,7 @@ def test_interrupt_ends_simulate_whenever_it_comes(folder) -> None:
         except subprocess.TimeoutExpired:
             process.send_signal(signal.SIGINT)
             _, errors = process.communicate(timeout=patience(60))
-            # Python itself ends by the signal where it came inside of code that `exec` runs
+            # with -m, Python ends by the signal where that came inside of a text that is executed
             assert process.returncode in (1, -signal.SIGINT) or i > 34, errors  # or at its end
             assert 'Traceback' not in errors
             assert json.loads((folder / 'runs/case1/summary.json').read_text())

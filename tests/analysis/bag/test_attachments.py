@@ -139,42 +139,40 @@ def test_a_vehicle_is_the_one_that_is_given_else_that_of_the_bag() -> None:
 def test_faults_are_those_of_a_scenario_that_is_one() -> None:
     case = load_scenario('faults_bluerov2_heavy')
     vehicle = attachments.vehicle_of(contents(vehicle=case.vehicle_data), BAG, None)
-    text = case.attachments['scenario.yaml']
-    found = attachments.faults_of(BagContents(attachments={'scenario.yaml': text}), vehicle)
-    assert found == marks_of(yaml.safe_load(text)['faults'], vehicle) != ()
-    assert attachments.faults_of(BagContents(), vehicle) == ()
-    wrong = yaml.safe_load(text) | {'duration': 'long'}
-    assert attachments.faults_of(contents(scenario=wrong), vehicle) == ()
+    told = yaml.safe_load(case.attachments['scenario.yaml'])
+    assert attachments.faults_of(told, vehicle) == marks_of(told['faults'], vehicle) != ()
+    assert attachments.faults_of(None, vehicle) == ()
+    assert attachments.faults_of(told | {'duration': 'long'}, vehicle) == ()
 
 
-@pytest.mark.parametrize(('told', 'kind', 'topic'), [
-    ({'sensors': {}}, 'sensor_bias', 'ground_truth/odom'),
-    ({'actuators': {}}, 'wrench_loss', 'wrench_applied'),
+@pytest.mark.parametrize(('told', 'kind', 'signal', 'topic'), [
+    ({'sensors': {}}, 'sensor_bias', 'measured', 'ground_truth/odom'),
+    ({'actuators': {}}, 'wrench_loss', 'applied', 'wrench_applied'),
 ])  # fmt: skip
-def test_what_counts_for_a_topic_that_is_missing_is_said(told, kind, topic) -> None:
-    by_scenario = attachments.notes_on_missing(contents(scenario=told), set(), {'odom'})
-    by_fault = attachments.notes_on_missing(BagContents(), {kind}, {'odom'})
-    assert [note.partition(':')[0] for note in by_scenario] == [topic]
+def test_what_counts_for_a_topic_that_is_missing_is_said(told, kind, signal, topic) -> None:
+    by_scenario = attachments.unrecorded(told, set(), {'odom'})
+    by_fault = attachments.unrecorded(None, {kind}, {'odom'})
+    assert by_scenario[signal].partition(':')[0] == topic
     assert by_fault == by_scenario
-    assert attachments.notes_on_missing(contents(scenario=told), {kind}, {topic}) == []
-    assert attachments.notes_on_missing(contents(scenario={}), set(), {'odom'}) == []
+    assert attachments.unrecorded(told, {kind}, {topic}) == {}
+    assert attachments.unrecorded({}, set(), {'odom'}) == {}
 
 
 def test_kinds_of_disturbances_are_known_where_a_scenario_is() -> None:
-    assert attachments.kinds_of(BagContents(), BAG) is None
+    assert attachments.kinds_of(None) is None
     for told, kinds in (
         ({}, []), ({'disturbance': {'kind': 'harmonic'}}, ['harmonic']), ({'disturbance': []}, []),
         ({'disturbance': [{'kind': 'step'}, 'odd', {'offset': 1}, {'kind': 'noise'}]},
          ['noise', 'step']),
     ):  # fmt: skip
-        assert attachments.kinds_of(contents(scenario=told), BAG) == {*kinds}
+        assert attachments.kinds_of(told) == {*kinds}
 
 
 def test_a_scenario_has_its_own_name_else_that_of_the_folder_around() -> None:
-    assert attachments.scenario_name(BagContents(), BAG) == 'harbour'
-    assert attachments.scenario_name(BagContents(), Path('/$a$\udcff/bag')) == f'_a_{MARK}'
+    assert attachments.scenario_name(None, BAG) == 'harbour'
+    assert attachments.scenario_name(None, Path('/$a$\udcff/bag')) == f'_a_{MARK}'
     for name in ('case1', 'a.b_c-d+1', 'x' * 100):
-        assert attachments.scenario_name(contents(scenario={'name': name}), BAG) == name
+        assert attachments.scenario_name({'name': name}, BAG) == name
     for name in ('_x', 'x' * 101, 'a b', None, 7):
         with pytest.raises(InputError, match=r'scenario.yaml: name: expected a word'):
-            attachments.scenario_name(contents(scenario={'name': name}), BAG)
+            attachments.scenario_name({'name': name}, BAG)

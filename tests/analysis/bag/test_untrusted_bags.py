@@ -393,7 +393,7 @@ def test_attached_yaml_whose_aliases_explode(
     contents = replace(contents, attachments={**contents.attachments, **texts})
     reading = {
         'params.yaml': attachments.parameters_of,
-        'scenario.yaml': attachments.scenario_name,
+        'scenario.yaml': attachments.scenario_of,
         'vehicle.yaml': lambda c, b: attachments.vehicle_of(c, b, None),
     }
     with pytest.raises(InputError, match='at most 100000 entries with all aliases written out'):

@@ -107,3 +107,19 @@ def test_a_run_that_begins_behind_its_law_has_no_certificate() -> None:
     found = lyapunov(whole.part(slice(10, None)), model)
     assert (found['applicable'], found['sup_z'], found['share_bound_28']) == (False, None, None)
     assert 'the law had begun before the first sample' in found['reason']
+
+
+@pytest.mark.parametrize(('signal', 'words', 'sup_z'), [
+    ('measured', 'the law does not see the true velocity', True),
+    ('applied', 'the wrench applied is not that of the law', False),
+])  # fmt: skip
+def test_what_was_there_and_nobody_recorded_breaks_the_identity_as_well(
+    signal, words, sup_z
+) -> None:
+    case = load_scenario('case1')
+    short = replace(case, data={**case.data, 'duration': 0.5})
+    run = replace(simulate(short, 'gvc', 'zoh'), law_state=None)
+    assert lyapunov(run, control_model(run.vehicle))['applicable']
+    found = lyapunov(replace(run, unrecorded=frozenset({signal})), control_model(run.vehicle))
+    assert (found['applicable'], found['reason'].startswith(words)) == (False, True)
+    assert (found['share_bound_28'], found['sup_z'] is not None) == (None, sup_z)

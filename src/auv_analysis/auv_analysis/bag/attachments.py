@@ -25,6 +25,7 @@ LAW = re.compile(r'[A-Za-z_][\w.]*:[A-Za-z_]\w*', re.ASCII)  # module:Class
 UNFIT = re.compile('[^A-Za-z0-9_.+-]+')
 UNKNOWN = 'unknown'  # law of a bag without params.yaml
 Parameters = dict[str, dict[str, Any]]  # of nodes, by their names
+Scenario = dict[str, Any] | None  # of a bag; None: it carries none
 OWN = 2  # rank of parameters for the namespace; 1: for any, 0: for another
 
 
@@ -143,25 +144,27 @@ def notes_on(law: str) -> list[str]:
     return [f'gains of {law} not looked at: a bag brings no code; --law {law} imports its module']
 
 
-def notes_on_missing(contents: BagContents, kinds: set[str], topics: set[str]) -> list[str]:
-    """What counts for what is not recorded, where the scenario or a topic says that it was there.
+COUNTS = (  # signal of a run, its topic, what says that it was there, and what counts without it
+    ('measured', interface.GROUND_TRUTH, {'sensors', *SENSING},
+     'what was measured counts as the truth'),
+    ('applied', interface.WRENCH_APPLIED, {'actuators', *ACTING}, 'the command counts as applied'),
+    ('disturbance_estimate', interface.DISTURBANCE_ESTIMATE, {interface.DISTURBANCE},
+     'f and its error are unknown'),
+)  # fmt: skip
+
+
+def unrecorded(scenario: Scenario, kinds: set[str], topics: set[str]) -> dict[str, str]:
+    """Signal of a `Run` -> what counts without it, of those that were there but in no topic.
 
     Parameters
     ----------
-    contents : of the bag, whose scenario has been read
+    scenario : of `scenario_of`
     kinds, topics : of the faults; that are recorded
 
     """
-    text = contents.attachments.get('scenario.yaml')
-    data = {} if text is None else parse_yaml(text, 'scenario.yaml', 'scenario')
-    there = {*data, *kinds, *topics}
-    counts = (
-        (interface.GROUND_TRUTH, {'sensors', *SENSING}, 'what was measured counts as the truth'),
-        (interface.WRENCH_APPLIED, {'actuators', *ACTING}, 'the command counts as applied'),
-        (interface.DISTURBANCE_ESTIMATE, {interface.DISTURBANCE}, 'f and its error are unknown'),
-    )
-    missing = [entry for entry in counts if entry[0] not in topics and there & entry[1]]
-    return [f'{topic}: no messages: {instead}' for topic, _, instead in missing]
+    there = {*(scenario or ()), *kinds, *topics}
+    return {signal: f'{topic}: no messages: {instead}' for signal, topic, told, instead in COUNTS
+            if topic not in topics and there & told}  # fmt: skip
 
 
 def vehicle_of(contents: BagContents, bag: Path, vehicle: str | Path | None) -> Vehicle:
@@ -178,24 +181,26 @@ def vehicle_of(contents: BagContents, bag: Path, vehicle: str | Path | None) -> 
     return vehicle_from_dict(parse_yaml(text, file, 'vehicle'), file)
 
 
-def faults_of(contents: BagContents, vehicle: Vehicle) -> tuple[Mark, ...]:
-    """Faults of the scenario that the bag carries, none where that is not one."""
+def scenario_of(contents: BagContents, bag: Path) -> Scenario:
+    """What the scenario of the bag says, None where it carries none."""
+    text = contents.attachments.get('scenario.yaml')
+    return None if text is None else parse_yaml(text, f'{bag}: scenario.yaml', 'scenario')
+
+
+def faults_of(scenario: Scenario, vehicle: Vehicle) -> tuple[Mark, ...]:
+    """Faults of a scenario, none where that is not one."""
     try:
-        data = parse_yaml(
-            contents.attachments.get('scenario.yaml', ''), 'scenario.yaml', 'scenario'
-        )
-        check(data, SCHEMA, 'scenario.yaml')
+        check(scenario or {}, SCHEMA, 'scenario.yaml')
     except InputError:
         return ()
-    return marks_of(data.get('faults', []), vehicle)
+    return marks_of((scenario or {}).get('faults', []), vehicle)
 
 
-def kinds_of(contents: BagContents, bag: Path) -> frozenset[str] | None:
+def kinds_of(scenario: Scenario) -> frozenset[str] | None:
     """Kinds of the disturbances, None where the bag does not say."""
-    text, file = contents.attachments.get('scenario.yaml'), f'{bag}: scenario.yaml'
-    if text is None:
+    if scenario is None:
         return None
-    listed = parse_yaml(text, file, 'scenario').get('disturbance', [])
+    listed = scenario.get('disturbance', [])
     specs = listed if isinstance(listed, list) else [listed]
     return frozenset(
         str(spec['kind']) for spec in specs if isinstance(spec, dict) and 'kind' in spec
@@ -207,12 +212,12 @@ def folder_name(name: str) -> str:
     return printable(name).replace('$', '_')
 
 
-def scenario_name(contents: BagContents, bag: Path) -> str:
-    """Name of the scenario; without its file, that of the folder around the bag."""
-    text, file = contents.attachments.get('scenario.yaml'), f'{bag}: scenario.yaml'
-    if text is None:
+def scenario_name(scenario: Scenario, bag: Path) -> str:
+    """Name of the scenario; without it, that of the folder around the bag."""
+    if scenario is None:
         return folder_name(bag.resolve().parent.name)
-    name = parse_yaml(text, file, 'scenario').get('name')
+    name = scenario.get('name')
     if not (isinstance(name, str) and NAME.fullmatch(name)):
-        raise InputError(file, 'name', 'a word without blanks or slashes', name)
+        expected = 'a word without blanks or slashes'
+        raise InputError(f'{bag}: scenario.yaml', 'name', expected, name)
     return name

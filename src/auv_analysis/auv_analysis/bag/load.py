@@ -172,21 +172,24 @@ def _facts(
     """What a `Run` has beside its samples; stamps (n,) say the step if nothing else does."""
     step = attachments.step_of(parameters, bag)
     law, gains = attachments.law_and_gains(parameters.get(interface.CONTROLLER, {}), bag)
-    faults, gaps = attachments.faults_of(contents, known), _gaps(ns)
-    notes = attachments.notes_on_missing(contents, {fault.kind for fault in faults}, topics)
+    scenario = attachments.scenario_of(contents, bag)
+    faults, gaps = attachments.faults_of(scenario, known), _gaps(ns)
+    missing = attachments.unrecorded(scenario, {fault.kind for fault in faults}, topics)
+    notes = [*missing.values()]
     if lost := sum(end - begin for begin, end in gaps):
         counted = f'{len(gaps)} gap{"s" * (len(gaps) > 1)}'
         notes.append(f'no samples in {counted}, {lost:.6g} s together')
     return {
         'vehicle': known,
-        'scenario': attachments.scenario_name(contents, bag),
+        'scenario': attachments.scenario_name(scenario, bag),
         'controller': attachments.controller_name(parameters, bag),
         'law': law,
         'gains': gains,
         'step': float(np.median(np.diff(ns))) / interface.NANOSECONDS if step is None else step,
         'source': 'bag',
-        'kinds': attachments.kinds_of(contents, bag),
+        'kinds': attachments.kinds_of(scenario),
         'faults': faults,
+        'unrecorded': frozenset(missing),
         'gaps': gaps,
         'notes': (*contents.notes, *attachments.notes_on(law), *notes),
     }

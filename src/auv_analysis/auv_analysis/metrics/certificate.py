@@ -247,7 +247,7 @@ def integral_of(run: Run, start: np.ndarray | None = None) -> np.ndarray | None:
     """
     if run.law in LAWS and run.law_state is not None:
         return run.law_state[:, :6]
-    if run.applied is not None or run.hold != 'zoh':
+    if run.applied is not None or 'applied' in run.unrecorded or run.hold != 'zoh':
         return None
     return sampled_integral(run.t, run.nu_d - run.nu_measured, start)
 

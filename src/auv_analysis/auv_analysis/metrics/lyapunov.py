@@ -90,7 +90,8 @@ def lyapunov(run: Run, model: ControlModel) -> dict[str, Any]:
 
     """
     gains = make_gains(run.law, run.gains) if run.gains else None
-    sensing, acting = run.sensing, run.acting
+    sensing = run.sensing or 'measured' in run.unrecorded
+    acting = run.acting or 'applied' in run.unrecorded
     whole = run.knows_wrench and run.knows_setpoint and not run.unknown
     reasons = [
         applicability(run.law, gains, model),

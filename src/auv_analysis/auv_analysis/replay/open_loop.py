@@ -203,7 +203,7 @@ def recorded_loop(
     return RecordedLoop(
         series,
         controller,
-        attachments.scenario_name(contents, bag),
+        attachments.scenario_name(attachments.scenario_of(contents, bag), bag),
         attachments.controller_name(parameters, bag),
         (*contents.notes, *begun),
     )

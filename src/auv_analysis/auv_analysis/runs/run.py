@@ -39,6 +39,7 @@ class RunInfo(ABC):
     notes : what is worth saying about the run, one line each
     gaps : (last time before, first time behind) of each time without samples, s as in t
     faults : of the simulated vehicle
+    unrecorded : signals of a `Run` that were there, and that nobody recorded
     acceleration : of a run with `unexplained`: how nu_dot was estimated, and its error
 
     """
@@ -55,6 +56,7 @@ class RunInfo(ABC):
     notes: tuple[str, ...] = field(default=())
     gaps: tuple[tuple[float, float], ...] = field(default=())
     faults: tuple[Mark, ...] = field(default=())
+    unrecorded: frozenset[str] = frozenset()
     acceleration: dict[str, Any] | None = None
 
     @property

@@ -298,16 +298,19 @@ def test_lifecycle_gains_are_taken_while_inactive_only() -> None:
         assert change(peer, Transition.TRANSITION_DEACTIVATE)
         lower = ParameterValue(type=8, double_array_value=[7.0])
         assert set_parameter(peer, 'gains.k_D', lower).successful
+        faster = ParameterValue(type=3, double_value=0.1)
+        assert set_parameter(peer, 'ramp', faster).successful
         assert change(peer, Transition.TRANSITION_ACTIVATE)
         assert change(peer, Transition.TRANSITION_DEACTIVATE)
 
-        def said() -> set[tuple[str, float]]:
+        def said() -> set[tuple[str, float, str]]:
             status = [message.status[0] for message in peer.heard[topics.DIAGNOSTICS.name]]
             facts = [{one.key: one.value for one in entry.values} for entry in status]
-            return {(told['law'], json.loads(told['gains'])['k_D'][0])
+            return {(told['law'], json.loads(told['gains'])['k_D'][0], told['changed'])
                     for told in facts if told.get('active') == 'True'}  # fmt: skip
 
-        peer.until(lambda: said() == {('cl', 20.0), ('cl', 7.0)}, 'each law, however short')
+        laws = {('cl', 20.0, '{}'), ('cl', 7.0, '{"ramp": 0.1}')}
+        peer.until(lambda: said() == laws, 'each law, however short')
         assert node.task == 'tracks cmd_vel with cl in real time'
 
 

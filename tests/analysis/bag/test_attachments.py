@@ -54,6 +54,9 @@ def told(law: str, k_D: float) -> tuple[str, str]:
     return law, json.dumps({'k_D': [k_D], 'k_I': [1.0], 'Lambda': [0.8], 'Gamma': [60.0]})
 
 
+UNCHANGED = ('{}',)
+
+
 @pytest.mark.parametrize(('laws', 'kept', 'note'), [
     ([told('gvc', 12.0)], ('gvc', 12.0), None),
     ([told('cl', 12.0)], ('cl', 12.0), 'law and gains are those that the controller says'),
@@ -66,7 +69,8 @@ def test_law_and_gains_are_those_that_the_controller_says(laws, kept, note) -> N
         'ros__parameters': {'law': 'gvc', 'ramp': 0.2, **GAINS, 'gains.k_P': None},
     }})  # fmt: skip
     bag.messages['/wrench'] = np.array([5, 6]) * SECOND, np.zeros((2, 6))
-    bag.laws = [(law, at) for law, at in zip(laws, (SECOND, 9_500_000_000), strict=False)]
+    times = SECOND, 9_500_000_000
+    bag.laws = [(law + UNCHANGED, at) for law, at in zip(laws, times, strict=False)]
     own = attachments.parameters_of(bag, BAG)['controller_node']
     assert own['ramp'] == 0.2
     assert (own.get('law', 'unknown'), *own.get('gains.k_D', [None])) == kept
@@ -74,11 +78,27 @@ def test_law_and_gains_are_those_that_the_controller_says(laws, kept, note) -> N
     assert note is None or note in bag.notes[0]
 
 
+@pytest.mark.parametrize(('changed', 'kept', 'note'), [
+    (['{}', '{}'], 0.2, ''), (['{"ramp": 0.9}'], 0.9, ''), (['x'], 0.2, ''),
+    (['{"ramp": 0.9}', '{"ramp": 0.1}'], 0.9, 'settings of the controller were changed while it'),
+])  # fmt: skip
+def test_settings_are_those_that_the_controller_says(changed, kept, note) -> None:
+    bag = contents(params={'controller_node': {
+        'ros__parameters': {'law': 'gvc', 'ramp': 0.2, **GAINS},
+    }})  # fmt: skip
+    bag.messages['/wrench'] = np.array([5, 6]) * SECOND, np.zeros((2, 6))
+    bag.laws = [((*told('gvc', 12.0), text), k * SECOND) for k, text in enumerate(changed, start=5)]
+    own = attachments.parameters_of(bag, BAG)['controller_node']
+    assert (own['law'], own['ramp']) == ('gvc', kept)
+    assert len(bag.notes) == bool(note)
+    assert ' '.join(bag.notes).startswith(note)
+
+
 def test_a_law_that_was_changed_before_the_first_wrench_was_never_in_charge() -> None:
     bag = contents(params={'controller_node': {'ros__parameters': {'law': 'gvc', **GAINS}}})
     bag.messages['/wrench'] = np.array([5, 6]) * SECOND, np.zeros((2, 6))
     course = [(told('cl', 1.0), 1), (told('gvc', 9.0), 3), (told('cl', 1.0), 5)]
-    bag.laws = [(law, at * SECOND) for law, at in course]
+    bag.laws = [(law + UNCHANGED, at * SECOND) for law, at in course]
     own = attachments.parameters_of(bag, BAG)['controller_node']
     assert (own['law'], own['gains.k_D']) == ('cl', [1.0])
 
@@ -86,7 +106,7 @@ def test_a_law_that_was_changed_before_the_first_wrench_was_never_in_charge() ->
 def test_a_controller_whose_parameters_no_file_has_says_its_law_and_gains() -> None:
     for data in ({}, {'params': {'/**': {'ros__parameters': {'step': 0.01}}}}):
         bag = contents(**data)
-        bag.laws = [(told('cl', 5.0), SECOND)]
+        bag.laws = [(told('cl', 5.0) + UNCHANGED, SECOND)]
         own = attachments.parameters_of(bag, BAG)['controller_node']
         assert (own['law'], own['gains.k_D'], bag.notes) == ('cl', [5.0], [])
 

@@ -51,33 +51,46 @@ def parameters_of(contents: BagContents, bag: Path) -> Parameters:
 
 
 def _in_charge(controller: dict[str, Any], contents: BagContents) -> dict[str, Any]:
-    """Parameters of a controller with the law and gains in charge; of several, with none."""
+    """Parameters of a controller with the law and gains in charge; of several, with none.
+
+    Settings are those that it says it began with.
+    """
     written = {name for name in controller if name == 'law' or name.startswith(GAIN)}
     others = {name: value for name, value in controller.items() if name not in written}
     wrenches = [ns for topic, (ns, _) in contents.messages.items() if role_of(topic) == WRENCH]
     begin = min((int(ns.min()) for ns in wrenches), default=0)
     ends = [*(ns for _, ns in contents.laws[1:]), math.inf]
     course = [one for one, end in zip(contents.laws, ends, strict=True) if end > begin]
-    if len({told for told, _ in course}) > 1:
-        said = ', '.join(
-            f'{law} from {max(0, ns - begin) / NANOSECONDS:.3g} s' for (law, _), ns in course
-        )
+    said = ', '.join(
+        f'{law} from {max(0, ns - begin) / NANOSECONDS:.3g} s' for (law, *_), ns in course
+    )
+    law, text, changed = course[0][0]
+    others |= _mapping(changed) or {}
+    if len({told[2] for told, _ in course}) > 1:
+        note = 'settings of the controller were changed while it was recorded, the first are taken'
+        contents.notes.append(f'{note}: {printable(said)}')
+    if len({told[:2] for told, _ in course}) > 1:
         note = 'law or gains were changed while it was recorded, none is taken'
         contents.notes.append(f'{note}: {printable(said)}')
         return others
-    law, text = course[0][0]
-    try:
-        gains = json.loads(text)
-    except (ValueError, RecursionError):
-        return controller
-    if not isinstance(gains, dict):
-        return controller
+    gains = _mapping(text)
+    if gains is None:
+        return {**controller, **others}
     told = {'law': law, **{f'{GAIN}{name}': value for name, value in gains.items()}}
     if written and told != {name: controller[name] for name in written if controller[name]}:
         contents.notes.append(
             'law and gains are those that the controller says, not of params.yaml'
         )
     return {**others, **told}
+
+
+def _mapping(text: str) -> dict[str, Any] | None:
+    """Mapping in JSON; None where the text is none."""
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    return found if isinstance(found, dict) else None
 
 
 def _nodes(entries: dict[str, Any], file: str, above: str = '') -> Iterator[tuple[str, str, Any]]:

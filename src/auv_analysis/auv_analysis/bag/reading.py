@@ -36,7 +36,7 @@ from auv_analysis.bag.step_topics import (
 )
 from auv_dynamics.files.errors import FailedError, InputError, reason
 from auv_dynamics.ros import interface
-from auv_dynamics.ros.interface import GAINS_FACT, LAW_FACT, Frames
+from auv_dynamics.ros.interface import GAINS_FACT, LAW_FACT, SETTINGS_FACT, Frames
 
 Series = tuple[np.ndarray, np.ndarray]  # stamps (n,) in ns, values (n, 6) or (n, 13)
 TOGETHER = 64  # chunks whose small arrays are joined at once: thousands of them scatter the memory
@@ -171,8 +171,9 @@ class BagContents(FileExtent):
     recorder : namespace of the recorder, which the attachments are of; None: the bag does not say
     strict : whether every step had to come once and in order; where it had not, a driver was free
         to say anything, and what cannot be used is left out; None: the bag does not say
-    laws : law and gains, in JSON, that the controller said to be in charge, one after the other,
-        and the log time of the first message that says so, ns
+    laws : law, and in JSON its gains and the settings that were changed since the controller's
+        start, that it said to be in charge, one after the other, and the log time of the first
+        message that says so, ns
 
     """
 
@@ -187,7 +188,7 @@ class BagContents(FileExtent):
     asked: bool = False
     recorder: str | None = None
     strict: bool | None = None
-    laws: list[tuple[tuple[str, str], int]] = field(default_factory=list)
+    laws: list[tuple[tuple[str, ...], int]] = field(default_factory=list)
 
     @property
     def is_of_another(self) -> bool:
@@ -311,7 +312,8 @@ class FileReader:
                 for status in self._health.message(table, i, channel).status:
                     facts = {one.key: one.value for one in status.values}
                     if status.name == name and LAW_FACT in facts:
-                        told = str(facts[LAW_FACT]), str(facts.get(GAINS_FACT))
+                        changed = str(facts.get(SETTINGS_FACT, '{}'))
+                        told = str(facts[LAW_FACT]), str(facts.get(GAINS_FACT)), changed
                         if not known or known[-1][0] != told:
                             known.append((told, int(table.log_times[i])))
 

@@ -21,6 +21,7 @@ RECORDER = 'recorder_node'  # name of the recorder, in whatever namespace
 CONTROLLER = 'controller_node'  # name of the controller, in whatever namespace
 GAIN = 'gains.'  # what the names of its gains among its parameters begin with
 LAW_FACT, GAINS_FACT = 'law', 'gains'  # what it says of itself on `/diagnostics`; gains in JSON
+SETTINGS_FACT = 'changed'  # parameters by name, of those that are not as they were at its start
 OBSERVER = 'auv_watch'  # name of a node that only looks on: nobody waits for it
 
 ODOM = 'odom'

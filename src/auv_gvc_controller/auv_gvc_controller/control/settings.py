@@ -125,6 +125,12 @@ class ControllerSettings:
         }
         return replace(read, source=source, **six)
 
+    def unlike(self, other: 'ControllerSettings') -> dict[str, Any]:
+        """Name of a parameter -> value here, of those that have another value there."""
+        values = {entry: getattr(self, entry.name) for entry in fields(self) if entry.metadata}
+        return {name_of(entry): value for entry, value in values.items()
+                if value != getattr(other, entry.name)}  # fmt: skip
+
     def setpoints(self) -> SetpointBuffer:
         """What keeps set-points until their odometry comes."""
         return SetpointBuffer(self.exact, self.setpoint_acceleration, *self.believed)

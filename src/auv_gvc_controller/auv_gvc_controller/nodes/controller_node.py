@@ -20,7 +20,14 @@ from auv_dynamics.files.errors import InputError, first_line
 from auv_dynamics.files.nearest import one_of as nearest_of
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.endpoints import why_silent
-from auv_dynamics.ros.interface import CONTROLLER, GAIN, GAINS_FACT, LAW_FACT, NANOSECONDS
+from auv_dynamics.ros.interface import (
+    CONTROLLER,
+    GAIN,
+    GAINS_FACT,
+    LAW_FACT,
+    NANOSECONDS,
+    SETTINGS_FACT,
+)
 from auv_dynamics.ros.node_interface import (
     ERROR,
     OK,
@@ -58,7 +65,7 @@ class ControllerParameters:
             text = '1 number (times identity), 6 (diagonal) or 36 (row-major)'
             declare(node, name, list[float], None, text, writable=True)
         self._vehicle = declare(node, 'vehicle', str, '', 'vehicle file, or shipped bare name')
-        self.settings = ControllerSettings.read(self._declare, node.get_name())
+        self._begun = self.settings = ControllerSettings.read(self._declare, node.get_name())
         self.lockstep = self.settings.lockstep
         self.acceleration = self.settings.setpoint_acceleration
         self.setpoints = self.settings.setpoints()
@@ -100,9 +107,13 @@ class ControllerParameters:
             gain, expected, found = refusal(error)
             key = f'{GAIN}{gain}' if gain else 'law'
             raise InputError(name, key, expected, found) from None
-        self.told = {LAW_FACT: law, GAINS_FACT: json.dumps(values, sort_keys=True)}
         self.settings = self._present({})
         self.settings.check_bounded()
+        self.told = {
+            LAW_FACT: law,
+            GAINS_FACT: json.dumps(values, sort_keys=True),
+            SETTINGS_FACT: json.dumps(self.settings.unlike(self._begun), sort_keys=True),
+        }
         self.setpoints.believe(*self.settings.believed)
         if self.lockstep:
             self.setpoints.reset()

@@ -229,6 +229,22 @@ def test_in_lock_step_only_rounding_is_a_reproduction(tmp_path: Path) -> None:
             assert reproduction(same, wrong).holds == holds, size
 
 
+def test_behind_a_hole_of_lock_step_nothing_is_reproduced(tmp_path: Path) -> None:
+    own = {'limits.gap': 0.05}
+    loop = recorded_loop(write(tmp_path / 'bag.mcap', lost=tuple(range(20, 30)), params=own))
+    found = reproduction(loop, open_loop(loop, 'gvc', GAINS))
+    assert (found.holds, found.missing) == (False, COUNT - 30)
+    assert found.sentence() == 'NOT reproduced: 10 recorded wrenches are not answered again'
+    free = recorded_loop(write(tmp_path / 'free.mcap', params=REAL_TIME))
+    assert reproduction(free, open_loop(free, 'gvc', GAINS)).missing == 0
+
+
+def test_a_lock_step_bag_without_its_beginning_says_so(tmp_path: Path) -> None:
+    loop = recorded_loop(write(tmp_path / 'bag.mcap', first=70))
+    (note,) = open_loop(loop, 'gvc', GAINS).notes
+    assert note.startswith('the bag begins at 0.7 s of its clock: this law begins without')
+
+
 def test_the_recorded_law_is_asked_again_where_it_is_known(tmp_path: Path) -> None:
     def asked(law: str, given: dict, params: dict | None = None) -> tuple[list, dict]:
         loop, told = recorded_loop(write(tmp_path / 'bag.mcap', params=params)), []

@@ -80,16 +80,20 @@ class Reproduction(NamedTuple):
         None: there is nothing to compare, or the recorded wrench is zero
     within : largest difference, N or N m; None: there is nothing to compare
     limit : of `relative`
+    missing : recorded wrenches of lock-step whose odometry is there, and was not answered again
 
     """
 
     relative: float | None
     within: float | None
     limit: float
+    missing: int = 0
 
     @property
     def holds(self) -> bool | None:
         """Whether it does; None: there is nothing to compare."""
+        if self.missing:
+            return False
         if self.relative is None:
             return None if self.within is None else self.within == 0.0
         return self.relative <= self.limit
@@ -97,6 +101,8 @@ class Reproduction(NamedTuple):
     def sentence(self) -> str:
         """What is said first of the results."""
         limit = f'(limit {100.0 * self.limit:g} %)'
+        if self.missing:
+            return f'NOT reproduced: {self.missing} recorded wrenches are not answered again'
         if self.within is None:
             return f'{UNCHECKED}: no recorded wrench answers a recorded odometry, but on a ramp'
         if self.relative is None:
@@ -112,19 +118,22 @@ def reproduction(recorded: RecordedLoop, again: OpenLoop) -> Reproduction:
 
     In real time without the ramps after it has taken over: they follow the clock of the node.
     """
-    limit = LOCKSTEP if recorded.controller.settings.lockstep else REAL_TIME
+    lockstep = recorded.controller.settings.lockstep
+    limit = LOCKSTEP if lockstep else REAL_TIME
     if again.ramps is not None:
         free = ~again.ramps
         again = replace(again, ns=again.ns[free], tau=again.tau[free])
     both = compared(recorded, again)
+    (heard, _), (said, _) = (recorded.series[r] for r in (interface.ODOM, interface.WRENCH))
+    missing = len(np.intersect1d(heard, said)) - len(both.t) if lockstep else 0
     if not len(both.t):
-        return Reproduction(None, None, limit)
+        return Reproduction(None, None, limit, missing)
     difference = both.answered - both.recorded
     within, most = float(np.abs(difference).max()), float(np.abs(both.recorded).max())
     if not most:
-        return Reproduction(None, within, limit)
+        return Reproduction(None, within, limit, missing)
     parts = (np.sqrt(np.mean((wrench / most) ** 2)) for wrench in (difference, both.recorded))
-    return Reproduction(float(np.divide(*parts)), within, limit)
+    return Reproduction(float(np.divide(*parts)), within, limit, missing)
 
 
 def ask_law(

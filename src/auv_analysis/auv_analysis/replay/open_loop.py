@@ -28,7 +28,7 @@ from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_gvc_controller.control.controller import FEWEST, Answer, VelocityController
-from auv_gvc_controller.control.odometry_guard import Now
+from auv_gvc_controller.control.odometry_guard import SAME_EPOCH, Now
 from auv_gvc_controller.control.setpoint_buffer import SAME, SetpointBuffer
 from auv_gvc_controller.control.settings import ControllerSettings, usual_acceleration
 from auv_gvc_controller.laws.law import law_class, make_gains, refusal, try_law
@@ -288,11 +288,16 @@ class _Course:
         ns, tau = recorded.series[interface.WRENCH]
         odometry = recorded.series[interface.ODOM][0]
         settings = recorded.controller.settings
+        self.notes: tuple[str, ...] = ()
         answered, first = np.unique(ns, return_index=True)
         self._free = settings.lockstep or not np.isin(odometry, answered).any()
         self._ramp = 0.0 if self._free else 1.5 * settings.ramp * interface.NANOSECONDS
         if self._free:
-            self.notes: tuple[str, ...] = ()
+            first_ns = int(odometry.min())
+            if settings.lockstep and 0 < first_ns < SAME_EPOCH:
+                begin = f'the bag begins at {first_ns / interface.NANOSECONDS:.6g} s of its clock'
+                said = 'this law begins without the integrals of what came before'
+                self.notes = (f'{begin}: {said}',)
             return
         again = np.ones(len(ns), bool)
         again[first] = False  # said later of the same odometry: a watchdog, or deactivation

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.block_runs import joined
-from helpers.made_messages import FRAMES, ODOMETRY, Bag, new, odometry, serialized, stamped
+from helpers.made_messages import FRAMES, ODOMETRY, SECOND, Bag, new, odometry, serialized, stamped
 from helpers.strategies import examples
 from hypothesis import given
 from hypothesis import strategies as st
@@ -354,8 +354,10 @@ def test_without_accelerations_they_are_the_slopes_of_the_set_points(tmp_path: P
     run = load_run(write(tmp_path, stamps, stamps, ahead=0))  # one more m/s in each 20 ms
     assert_allclose(run.nu_d_dot, 50.0)
     many = np.arange(70_000.0)[:, None] ** 2 * np.ones(6)  # in blocks: their seams do not show
-    slopes = np.concatenate(list(_slopes(many, 2.0)))
+    slopes = np.concatenate(list(_slopes(many, 2 * SECOND * np.arange(70_000))))
     assert_allclose(slopes[1:-1, 0], np.arange(1.0, 69_999.0))
+    (uneven,) = _slopes(many[[0, 1, 3, 4, 6]], np.array([0, 1, 3, 4, 6]) * SECOND)
+    assert_allclose(uneven[1:-1, 0], [2.0, 6.0, 8.0])
 
 
 def test_of_two_messages_of_a_stamp_the_first_counts(tmp_path: Path) -> None:

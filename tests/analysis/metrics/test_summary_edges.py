@@ -59,6 +59,16 @@ def test_each_axis_settles_by_itself(axis):
     assert settling_time(t, error, nu_d) == expected
 
 
+def test_the_settling_time_of_a_part_counts_from_its_first_sample(run):
+    nu = run.nu_d.copy()
+    nu[:8] += 1.0
+    part = replace(run, nu=nu, gaps=((run.t[1], run.t[2]), (run.t[11], run.t[12])))
+    part = part.part(slice(5, None))
+    found = summarize(part)
+    assert found['velocity_error']['settling_time'] == [0.03] * 6
+    assert part.gaps == ((run.t[11], run.t[12]),)
+
+
 def test_a_run_without_gains_has_none(run):
     found = summarize(replace(run, gains={}))['gains']
     assert found == {'K_D': None, 'K_f': None}

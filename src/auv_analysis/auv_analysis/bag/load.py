@@ -24,7 +24,7 @@ from auv_analysis.bag.reading import (
 from auv_analysis.bag.step_topics import KINDS, READERS, NotOursError, namespace_of, role_of
 from auv_analysis.runs.run import Run, rows_of
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.plant.plant import unwrapped_eta
+from auv_dynamics.plant.plant import initial_state, unwrapped_eta
 from auv_dynamics.ros import interface
 from auv_dynamics.vehicle.frames import NED_FSD, named_axes
 from auv_dynamics.vehicle.vehicle import Vehicle
@@ -32,6 +32,10 @@ from auv_dynamics.vehicle.vehicle import Vehicle
 WHOLE = 1 << 16  # steps up to which a recording is kept in memory
 REQUIRED = (interface.ODOM, interface.WRENCH)
 Steps = tuple[np.ndarray, dict[str, np.ndarray]]  # stamps (n,) in ns, role -> values
+PLANT = 'plant_node'
+FEW = 3  # resets whose times are named
+BACK_AT, AWAY = 1e-12, 1e-6  # from where it started: a step from one to the other is a reset
+LOOSE = 1.0  # s that a recording in real time may lack at its end
 SETPOINTS = (interface.CMD_VEL, interface.CMD_ACCEL)
 LATEST = 'latest'
 PAIRED = 0.75  # share of odometry with a set-point of its stamp, from which each should have one
@@ -106,9 +110,13 @@ def open_bag(
                if not (held and role in SETPOINTS)}  # fmt: skip
     dropped = [note for role, stamps in counted.items() for note in _dropped(role, stamps, len(ns))]
     known = attachments.vehicle_of(contents, bag, vehicle)
-    facts = _facts(contents, bag, parameters, known, ns, {*values})
-    facts['notes'] += *begun, *dropped
-    return Recording(_run(ns, values, facts, whole), contents.attachments)
+    plant = parameters.get(PLANT, {})
+    zero, missing = _time_zero(ns, plant)
+    kept, again = _longest_part(ns, values, plant, zero)
+    values = {role: rows[kept] for role, rows in values.items()}
+    facts = _facts(contents, bag, parameters, known, (ns[kept], zero), {*values})
+    facts['notes'] += *begun, *missing, *again, *dropped
+    return Recording(_run(ns[kept], zero, values, facts, whole), contents.attachments)
 
 
 def read_vehicle(bag: Path, namespace: str | None, whole: float = math.inf) -> BagContents:
@@ -165,15 +173,80 @@ def _dropped(role: str, stamps: np.ndarray, kept: int) -> list[str]:
     return notes
 
 
+def _time_zero(ns: np.ndarray, plant: Mapping[str, Any]) -> tuple[int, list[str]]:
+    """Stamp, ns, from which the time of a run counts, and notes on what of it is missing.
+
+    That of the first of steps (n,), but that our plant in lock-step begins with zero, whatever is
+    missing in the bag.
+
+    Parameters
+    ----------
+    ns : (n,) rising stamps
+    plant : parameters of the plant node, empty beside a driver
+
+    """
+    step, planned = (plant.get(key, math.nan) for key in ('step', 'duration'))
+    if not all(isinstance(value, int | float) for value in (step, planned)):
+        return int(ns[0]), []
+    end = float(ns[-1]) / interface.NANOSECONDS
+    if not end <= planned + step / 2:  # with no end, or stamps that are not of a plant
+        return int(ns[0]), []
+    lockstep = plant.get('lockstep') is True
+    notes = [f'begins at {ns[0] / interface.NANOSECONDS:.6g} s'] * bool(lockstep and ns[0] > 0)
+    if planned - end > (step / 2 if lockstep else LOOSE):
+        notes.append(f'ends at {end:.6g} s of the {planned:g} s that were planned')
+    return 0 if lockstep else int(ns[0]), notes
+
+
+def _longest_part(
+    ns: np.ndarray, values: Mapping[str, np.ndarray], plant: Mapping[str, Any], zero: int
+) -> tuple[slice, list[str]]:
+    """The longest part of a run that no reset of the plant interrupts, and a note on the others.
+
+    Parameters
+    ----------
+    ns, values : (n,) stamps, role -> rows
+    plant : parameters of the plant node, empty beside a driver
+    zero : stamp from which time counts, ns
+
+    """
+    try:
+        initial = [plant.get(f'initial.{key}', [0.0] * 6) for key in ('eta', 'nu')]
+        start = initial_state(*np.array(initial, float).reshape(2, 6))
+    except (TypeError, ValueError):
+        return slice(None), []
+    x = values.get(interface.GROUND_TRUTH, values[interface.ODOM])
+    away = [np.abs(rows_of(x, here) - start).max(axis=1) for here in slices(len(x))]
+    far = np.concatenate(away)
+    resets = np.flatnonzero((far[1:] < BACK_AT) & (far[:-1] > AWAY)) + 1
+    if not (plant and len(resets)):
+        return slice(None), []
+    edges = [0, *resets.tolist(), len(ns)]
+    kept = int(np.argmax(np.diff(edges)))
+    times = ', '.join(f'{(ns[k] - zero) / interface.NANOSECONDS:.6g}' for k in resets[:FEW])
+    more = f' and {len(resets) - FEW} times more' * (len(resets) > FEW)
+    note = f'the plant was reset at {times} s{more}; read the longest of {len(edges) - 1} parts'
+    return slice(*edges[kept : kept + 2]), [note]
+
+
 def _facts(
-    contents: BagContents, bag: Path, parameters: Parameters, known: Vehicle, ns: np.ndarray,
-    topics: set[str],
+    contents: BagContents, bag: Path, parameters: Parameters, known: Vehicle,
+    times: tuple[np.ndarray, int], topics: set[str],
 ) -> dict[str, Any]:  # fmt: skip
-    """What a `Run` has beside its samples; stamps (n,) say the step if nothing else does."""
+    """What a `Run` has beside its samples; stamps (n,) say the step if nothing else does.
+
+    `times` are these stamps and the one from which time counts, ns.
+    """
+    ns, zero = times
     step = attachments.step_of(parameters, bag)
     law, gains = attachments.law_and_gains(parameters.get(interface.CONTROLLER, {}), bag)
     scenario = attachments.scenario_of(contents, bag)
-    faults, gaps = attachments.faults_of(scenario, known), _gaps(ns)
+    faults, gaps = attachments.faults_of(scenario, known), _gaps(ns, zero)
+    if PLANT in parameters:  # whose time a fault is told in, that of the stamps
+        late = zero / interface.NANOSECONDS
+        faults = tuple(  # one that holds throughout goes on to do so
+            f._replace(start=f.start and f.start - late, end=f.end - late) for f in faults
+        )
     missing = attachments.unrecorded(scenario, {fault.kind for fault in faults}, topics)
     notes = [*missing.values()]
     if lost := sum(end - begin for begin, end in gaps):
@@ -195,21 +268,23 @@ def _facts(
     }
 
 
-def _gaps(ns: np.ndarray) -> tuple[tuple[float, float], ...]:
-    """Last time before and first behind each pause of rising stamps (n,), s from the first."""
+def _gaps(ns: np.ndarray, zero: int) -> tuple[tuple[float, float], ...]:
+    """Last time before and first behind each pause of rising stamps (n,), s since `zero`."""
     where = np.flatnonzero(np.diff(ns) > usual_limit(ns))
-    edges = (np.stack([ns[where], ns[where + 1]], axis=1) - ns[0]) / interface.NANOSECONDS
+    edges = (np.stack([ns[where], ns[where + 1]], axis=1) - zero) / interface.NANOSECONDS
     return tuple((begin, end) for begin, end in edges.tolist())
 
 
-def _run(ns: np.ndarray, values: dict[str, np.ndarray], facts: dict[str, Any], whole: float) -> Run:
+def _run(
+    ns: np.ndarray, zero: int, values: dict[str, np.ndarray], facts: dict[str, Any], whole: float
+) -> Run:
     """Run of complete steps; NaN is what was not recorded, nu_d_dot then the slope of nu_d."""
     x = values.get(interface.GROUND_TRUTH, values[interface.ODOM])
-    t = ((rows_of(ns, here) - ns[0]) / interface.NANOSECONDS for here in slices(len(ns)))
+    t = ((rows_of(ns, here) - zero) / interface.NANOSECONDS for here in slices(len(ns)))
     unknown = np.broadcast_to(np.nan, (len(ns), 6))
     nu_d, nu_d_dot = values.get(interface.CMD_VEL, unknown), values.get(interface.CMD_ACCEL)
     if nu_d_dot is None:
-        nu_d_dot = gathered(_slopes(nu_d, facts['step']), whole)
+        nu_d_dot = gathered(_slopes(nu_d, ns), whole)
     sensing = interface.GROUND_TRUTH in values
     return Run(
         **facts,
@@ -237,12 +312,23 @@ def _unrolled(x: np.ndarray) -> Iterator[np.ndarray]:
         yield eta
 
 
-def _slopes(rows: np.ndarray, step: float) -> Iterator[np.ndarray]:
-    """Central differences of rows (n, 6), in blocks."""
+def _slopes(rows: np.ndarray, ns: np.ndarray) -> Iterator[np.ndarray]:
+    """Slopes at rows (n, 6) with stamps (n,), in blocks: of the parabola through the neighbours.
+
+    Beside a gap or at an end it is the slope to the only neighbour, NaN where there is none.
+    """
+    limit, edge = usual_limit(ns), np.full((1, 6), np.nan)
     for here in slices(len(rows)):
         first = max(here.start - 1, 0)
-        slope = np.gradient(rows_of(rows, slice(first, here.stop + 1)), step, axis=0)
-        yield slope[here.start - first :][: here.stop - here.start]
+        wide = slice(first, here.stop + 1)
+        apart = np.diff(rows_of(ns, wide))[:, None]
+        slopes = np.diff(rows_of(rows, wide), axis=0) / (apart / interface.NANOSECONDS)
+        slopes[apart[:, 0] > limit] = np.nan
+        before, after = np.concatenate([edge, slopes]), np.concatenate([slopes, edge])
+        back, ahead = np.concatenate([[[1]], apart]), np.concatenate([apart, [[1]]])
+        middle = (ahead * before + back * after) / (back + ahead)
+        found = np.where(np.isnan(before), after, np.where(np.isnan(after), before, middle))
+        yield found[here.start - first :][: here.stop - here.start]
 
 
 def topics_of_one_graph(contents: BagContents, bag: Path) -> dict[str, str]:

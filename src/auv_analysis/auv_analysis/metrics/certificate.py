@@ -252,9 +252,16 @@ def integral_of(run: Run, start: np.ndarray | None = None) -> np.ndarray | None:
     return sampled_integral(run.t, run.nu_d - run.nu_measured, start)
 
 
-def began_before(run: Run) -> bool:
-    """Whether a law had adapted before the first sample, so that its z there is not known."""
-    return run.law_state is None and bool((np.abs(run.disturbance_estimate[0]) > 0.0).any())
+def why_unknown(run: Run) -> str:
+    """Why z of a law is not known: it had integrated before the first sample, or began anew."""
+    if run.law_state is not None:
+        return ''
+    f = (block.disturbance_estimate for block in run.blocks())
+    adapted = np.concatenate([(np.abs(rows) > 0.0).any(axis=1) for rows in f])
+    if run.start > 0.0 or adapted[0]:
+        return 'the law had begun before the first sample: z is not known'
+    anew = np.any(adapted[:-1] & ~adapted[1:])
+    return 'the law began anew within the run: z is not known' if anew else ''
 
 
 def certificate_blocks(run: Run, model: ControlModel, rows: int = BLOCK) -> Iterator[Certificate]:
@@ -273,7 +280,7 @@ def certificate_blocks(run: Run, model: ControlModel, rows: int = BLOCK) -> Iter
 
     """
     gains = make_gains(run.law, run.gains)
-    start, late = None, began_before(run)
+    start, late = None, why_unknown(run)
     for wide, inside in run.wide_blocks(MARGIN, rows):
         unknown = np.full(wide.nu.shape, np.nan)
         z = None if late else integral_of(wide, start)

@@ -12,9 +12,9 @@ from auv_analysis.metrics.certificate import (
     SHARES,
     Form,
     as_figures,
-    began_before,
     certificate_blocks,
     form_of,
+    why_unknown,
 )
 from auv_analysis.runs.run import Run
 from auv_gvc_controller.laws.law import make_gains
@@ -98,7 +98,7 @@ def lyapunov(run: Run, model: ControlModel) -> dict[str, Any]:
         _against_15(run.knows_disturbance, run.kinds),
         'the law does not see the true velocity, so that (26) is not L_dot' if sensing else '',
         '' if whole else 'not all velocities, the wrench and the set-point were recorded',
-        'the law had begun before the first sample: z is not known' if began_before(run) else '',
+        why_unknown(run),
         'the run has gaps, across which nothing has a rate' if run.gaps else '',
         'the wrench applied is not that of the law, so that (26) is not L_dot' if acting else '',
     ]

@@ -209,7 +209,8 @@ def _errors(run: Run, whole: Moments, after: Moments, known: np.ndarray) -> dict
     asked = ~np.isnan(run.nu_d[0])
     known = known & asked
     band = band_of(whole.peaks[signals.SETPOINT])
-    blocks = ((block.t, block.nu_d - block.nu) for block in run.blocks())
+    errors = ((block.t, block.nu_d - block.nu) for block in run.blocks())
+    blocks = ((np.round(t - run.start, 9) if run.start else t, error) for t, error in errors)
     times, residual = _settling(blocks, run.samples, band)
     late = _peak(after, signals.ERROR)
     return {

@@ -189,7 +189,9 @@ class Run(RunInfo):
     def part(self, keep: Any) -> 'Run':
         """Run of the samples that an index, slice or mask of samples keeps."""
         kept: dict[str, Any] = {name: rows_of(a, keep) for name, a in self.arrays().items()}
-        return replace(self, **kept)
+        t = np.atleast_1d(kept['t'])
+        gaps = tuple(gap for gap in self.gaps if len(t) and t[0] <= gap[0] and gap[1] <= t[-1])
+        return replace(self, **kept, gaps=gaps)
 
     def blocks(self, rows: int = BLOCK) -> Iterator['Run']:
         """The run in parts of so many samples."""

@@ -18,7 +18,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from auv_analysis import load_scenario, summarize
 from auv_analysis.bag.load import _slopes, load_run, open_bag
 from auv_analysis.bag.metadata import RECORDING, recording_text
-from auv_analysis.bag.reading import read_bag
+from auv_analysis.bag.reading import read_bag, stretches
 from auv_analysis.cli.main import main
 from auv_analysis.nodes.recorder_node import StepLedger
 from auv_analysis.runs.run import Run
@@ -222,6 +222,33 @@ def test_an_odometry_of_another_time_is_left_out_and_counted(tmp_path: Path, ms:
         'odom: 1 of 100 messages were left out: their stamps are far off those around them',
         'wrench: 1 of 100 messages are not complete on all topics',
     )
+
+
+def test_a_clock_that_was_set_back_by_less_than_a_second_has_begun_anew(tmp_path: Path) -> None:
+    """Sorted by their stamps, two motions would lie between each other."""
+    ms = [*range(1000, 4000, GRID), *range(3507, 5000, GRID)]
+    bag = Bag(tmp_path / 'bag.mcap', chunk_size=2000)
+    bag.attach('vehicle.yaml', VEHICLE)
+    bag.attach(RECORDING, recording_text(False, {}))
+    for k, stamp in enumerate(ms):
+        made = stamped('Wrench', stamp * MS, [float(k)] * 6)
+        bag.add('/odom', ODOMETRY, k * MS, serialized(odometry(stamp * MS, state(k))))
+        bag.add('/wrench', made.__msgtype__, k * MS, serialized(made))
+    run = load_run(bag.close())
+    assert_array_equal(run.tau[:, 0], np.arange(150.0))
+    assert run.notes == (
+        'odom: the clock jumps back 1 times; read the longest of 2 stretches, left 75 messages',
+    )
+
+
+@pytest.mark.parametrize(('order', 'edges'), [
+    ([*range(60), *range(30, 100)], [0, 60, 130]),
+    ([*range(20), *range(40, 60), *range(20, 40), *range(60, 100)], [0, 100]),  # they came late
+    ([*range(0, 60, 20), *range(30, 60)], [0, 33]), ([*range(40), 10, *range(40, 60)], [0, 61]),
+    ([5, 5, 5], [0, 3]), ([], [0, 0]),
+])  # fmt: skip
+def test_where_a_clock_begins_anew(order: list[int], edges: list[int]) -> None:
+    assert stretches(np.array(order, np.int64) * 10 * MS) == edges
 
 
 def test_a_topic_with_another_clock_is_said(tmp_path: Path) -> None:

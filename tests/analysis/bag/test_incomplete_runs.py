@@ -98,3 +98,13 @@ def test_slopes_do_not_lead_across_gaps_and_know_uneven_steps(tmp_path: Path) ->
     slopes = load_run(squares).nu_d_dot
     assert_allclose(slopes[:-1], 100.0)
     assert np.isnan(slopes[-1]).all(), 'no neighbour, no slope'
+
+
+def test_of_a_bag_that_was_thinned_the_integrals_are_not_known(tmp_path: Path) -> None:
+    run = load_run(write(tmp_path / 'thin', range(0, 101, 5)))
+    assert (run.step, run.gaps) == (0.01, ())
+    assert said(run, 'samples are 0.05 s apart, in a run of steps of 0.01 s')
+    assert 'samples of the law are missing: z is not known' in summarize(run)['lyapunov']['reason']
+    one = load_run(write(tmp_path / 'one', [*range(50), *range(51, 101)]))
+    assert not said(one, 'apart')
+    assert 'samples of the law are missing' in summarize(one)['lyapunov']['reason']

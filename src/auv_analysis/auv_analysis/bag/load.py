@@ -22,6 +22,7 @@ from auv_analysis.bag.reading import (
     usual_limit,
 )
 from auv_analysis.bag.step_topics import KINDS, READERS, NotOursError, namespace_of, role_of
+from auv_analysis.metrics.certificate import SPARSE
 from auv_analysis.runs.run import Run, rows_of
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.plant.plant import initial_state, unwrapped_eta
@@ -186,10 +187,9 @@ def _time_zero(ns: np.ndarray, plant: Mapping[str, Any]) -> tuple[int, list[str]
 
     """
     step, planned = (plant.get(key, math.nan) for key in ('step', 'duration'))
-    if not all(isinstance(value, int | float) for value in (step, planned)):
-        return int(ns[0]), []
-    end = float(ns[-1]) / interface.NANOSECONDS
-    if not end <= planned + step / 2:  # with no end, or stamps that are not of a plant
+    told, end = isinstance(step, int | float), float(ns[-1]) / interface.NANOSECONDS
+    # of a run without an end, or stamps that are no plant's, nothing is known
+    if not (told and isinstance(planned, int | float) and end <= planned + step / 2):
         return int(ns[0]), []
     lockstep = plant.get('lockstep') is True
     notes = [f'begins at {ns[0] / interface.NANOSECONDS:.6g} s'] * bool(lockstep and ns[0] > 0)
@@ -248,7 +248,9 @@ def _facts(
             f._replace(start=f.start and f.start - late, end=f.end - late) for f in faults
         )
     missing = attachments.unrecorded(scenario, {fault.kind for fault in faults}, topics)
-    notes = [*missing.values()]
+    notes, usual = [*missing.values()], float(np.median(np.diff(ns))) / interface.NANOSECONDS
+    if step is not None and usual > SPARSE * step:
+        notes.append(f'samples are {usual:.6g} s apart, in a run of steps of {step:.6g} s')
     if lost := sum(end - begin for begin, end in gaps):
         counted = f'{len(gaps)} gap{"s" * (len(gaps) > 1)}'
         notes.append(f'no samples in {counted}, {lost:.6g} s together')
@@ -258,7 +260,7 @@ def _facts(
         'controller': attachments.controller_name(parameters, bag),
         'law': law,
         'gains': gains,
-        'step': float(np.median(np.diff(ns))) / interface.NANOSECONDS if step is None else step,
+        'step': usual if step is None else step,
         'source': 'bag',
         'kinds': attachments.kinds_of(scenario),
         'faults': faults,

@@ -106,7 +106,8 @@ def slices(count: int, rows: int = 1 << 13) -> Iterator[slice]:
 
 
 HEALTH = 'diagnostic_msgs/msg/DiagnosticArray'
-BACK = interface.NANOSECONDS  # ns: stamps that fall by more have begun anew, less came late
+BACK = interface.NANOSECONDS  # ns: stamps that fall by more have begun anew
+MOST_FALLS = 1000  # by less, beyond which they are none of a clock that was set
 GAP_PERIODS = 5.0  # median periods, at least, that make a pause a gap
 GAP_USUAL = 3.0  # times the interval that nine of ten keep: some topics come in bursts
 USUAL = 90.0  # percentile
@@ -114,7 +115,28 @@ USUAL = 90.0  # percentile
 
 def stretches(ns: np.ndarray) -> list[int]:
     """Where the clock of stamps (n,) begins anew in the order of the bag, with 0 and n."""
-    return [0, *(np.flatnonzero(np.diff(ns) < -BACK) + 1).tolist(), len(ns)]
+    anew = np.flatnonzero(np.diff(ns) < -BACK) + 1
+    return [0, *np.union1d(anew, _set_back(ns)).tolist(), len(ns)]
+
+
+def _set_back(ns: np.ndarray) -> np.ndarray:
+    """Where stamps (n,) fall by less, and then count through a time that has been once more.
+
+    Of messages that came late, the time that they are of had been left out before.
+    """
+    apart, found = np.diff(ns), list[int]()
+    if not np.any(apart > 0):
+        return np.array(found, np.int64)
+    period = float(np.median(apart[apart > 0]))
+    falls = np.flatnonzero((apart < -GAP_PERIODS * period) & (apart >= -BACK))
+    for i in falls.tolist() if len(falls) <= MOST_FALLS else ():
+        again = ns[i + 1 : i + 2 + int(2 * BACK / period)]
+        count = int(np.argmax(again > ns[i])) if np.any(again > ns[i]) else len(again)
+        again, before = again[:count], ns[max(i + 1 - count, 0) : i + 1]
+        walks = 2 * count * period >= -apart[i] and np.all(np.diff(again) > 0)
+        if walks and 2 * np.count_nonzero((before >= again[0]) & (before <= again[-1])) >= count:
+            found.append(i + 1)
+    return np.array(found, np.int64)
 
 
 def strays(ns: np.ndarray, topic: str, notes: list[str]) -> np.ndarray:
@@ -140,7 +162,8 @@ def are_swapped(ns: np.ndarray) -> bool:
 
     Chunks and files may; where a clock began anew, the parts overlap or are apart.
     """
-    parts = np.split(ns, np.flatnonzero(np.abs(np.diff(ns)) > BACK) + 1)
+    jumps = np.flatnonzero(np.abs(np.diff(ns)) > BACK) + 1
+    parts = np.split(ns, np.union1d(jumps, stretches(ns)[1:-1]).astype(np.int64))
     spans = sorted((part.min(), part.max()) for part in parts)
     return all(0 < other[0] - one[1] <= BACK for one, other in pairwise(spans))
 

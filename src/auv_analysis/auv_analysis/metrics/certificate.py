@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_analysis.runs.run import BLOCK, Run
+from auv_analysis.runs.run import BLOCK, Run, rows_of
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import ControlModel
 
@@ -225,6 +225,7 @@ def size(a: np.ndarray) -> np.ndarray:
 BOUND_TOLERANCE = 1e-6  # of max abs((26)): allows for truncation in the measured L_dot
 TRANSIENT = 2.0 - 1e-9  # s, which the paper leaves out of its errors
 MARGIN = NODES - 1  # samples about a block with which its derivatives are those of the whole run
+SPARSE = 1.5  # steps: samples that are further apart are not all that the law had
 KEPT = 1 << 16  # samples outside the bound, as far as one can say before the end
 SHARES = ('share_of_time_increasing', 'share_condition_27', 'share_bound_28')
 FIGURES = (
@@ -260,6 +261,8 @@ def why_unknown(run: Run) -> str:
     adapted = np.concatenate([(np.abs(rows) > 0.0).any(axis=1) for rows in f])
     if run.start > 0.0 or adapted[0]:
         return 'the law had begun before the first sample: z is not known'
+    if not run.gaps and np.diff(rows_of(run.t, slice(None))).max(initial=0.0) > SPARSE * run.step:
+        return 'samples of the law are missing: z is not known'
     anew = np.any(adapted[:-1] & ~adapted[1:])
     return 'the law began anew within the run: z is not known' if anew else ''
 

@@ -364,6 +364,20 @@ def test_a_publisher_that_falls_silent_is_missed_however_far_ahead_it_was():
     assert all(found[51:])
 
 
+@pytest.mark.parametrize('acceleration', [DIFFERENCE, SAME])
+@pytest.mark.parametrize('begins', [0, 1500])
+def test_what_a_silent_publisher_left_ahead_is_not_obeyed_when_another_begins(acceleration, begins):
+    bench, stop = Bench(setpoint=0.5, acceleration=acceleration), (0.0,) * 6
+    for ms in range(begins, 3000, 10):
+        bench.setpoint(ms, at=0.0)
+    for ms in range(0, 1000, 10):
+        bench.odometry(ms)
+    for ms in range(1000, 2000, 10):
+        bench.setpoint(ms - 7, stop)
+        assert bench.odometry(ms).trouble == ''
+        assert bench.pairing.find(ms * MS).nu_d == stop
+
+
 def test_integrals_do_not_outlive_a_watchdog():
     bench = Bench(odometry=0.5, setpoint=10.0)
     for ms in range(0, 300, 10):

@@ -199,10 +199,12 @@ class VelocityController:
         if self._waiting is None:
             return None
         ns, x, dt = self._waiting
+        silent = self._silent(now)
+        self._setpoints.left |= silent
         reference = self._setpoints.find(ns)
         if reference is None:
             return None if self._exact else self._trip(ns, 'no set-point yet', now)
-        stale = self._stale(ns, reference, now)
+        stale = self._stale(ns, reference, silent)
         if stale:
             return self._trip(ns, stale, now)
         self._waiting = None
@@ -255,16 +257,19 @@ class VelocityController:
         self._waiting, self._heard, self._bridge = None, None, True
         return Answer(self._guard.last or 0, self._output.drop(), ZERO)
 
-    def _stale(self, ns: int, reference: Reference, now: Now) -> str:
+    def _silent(self, now: Now) -> bool:
+        """Whether set-points have not been heard for too long, however far ahead they were."""
+        late = self._timeouts
+        return late is not None and now.steady - self._setpoints.heard > late.setpoint
+
+    def _stale(self, ns: int, reference: Reference, silent: bool) -> str:
         """Why a set-point is not followed any more, or an empty text."""
         if self._timeouts is None:
             return ''
         most, age = self._timeouts.setpoint, (ns - reference.ns) / 1e9
         if age > most:
             return f'no set-point for {age:.3g} s'
-        if now.steady - self._setpoints.heard > most:
-            return f'no set-point heard for {most:g} s'
-        return ''
+        return f'no set-point heard for {most:g} s' if silent else ''
 
     def _trip(self, ns: int, trouble: str, now: Now) -> Answer:
         """Let go because of a watchdog: in real time the integrals do not outlive it."""

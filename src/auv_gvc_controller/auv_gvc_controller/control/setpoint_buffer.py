@@ -121,6 +121,8 @@ class SetpointBuffer:
     Attributes
     ----------
     heard : when the newest set-point came, s of the steady clock
+    left : whether who sent them has fallen silent: the next one may be of somebody else, who did
+        not send what still lies ahead
 
     """
 
@@ -137,7 +139,7 @@ class SetpointBuffer:
         self._nu_d_dot: OrderedDict[int, tuple[float, ...]] = OrderedDict()
         self._used: Reference | None = None
         self._slope_until = 0  # ns
-        self.heard = 0.0
+        self.heard, self.left = 0.0, False
 
     def believe(self, limits: Limits, steepest: tuple[float, ...] | None) -> None:
         """Set the limits of what comes from now on."""
@@ -150,8 +152,12 @@ class SetpointBuffer:
     def forget(self) -> None:
         """Forget everything, as when the stamps begin anew."""
         self.reset()
+        self._empty()
+
+    def _empty(self) -> None:
         self._nu_d.clear()
         self._nu_d_dot.clear()
+        self.left = False
 
     def setpoint(self, ns: int, nu_d: tuple[float, ...], steady: float = 0.0) -> None:
         """Keep a set-point that came at `steady` s.
@@ -162,6 +168,8 @@ class SetpointBuffer:
 
         """
         self._limits.check_velocity(nu_d)
+        if self.left:
+            self._empty()
         self._keep(self._nu_d, ns, nu_d)
         self.heard = steady
 

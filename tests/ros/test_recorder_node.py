@@ -976,3 +976,26 @@ def test_in_real_time_the_last_measurement_need_not_come(
         monkeypatch.setattr(recorder_node, 'PATIENCE', -1.0)
         timers[0]()
         assert node.exit_code == (0 if ends else None)
+
+
+def test_who_has_left_before_the_end_is_not_waited_for_without_end(
+    tmp_path: Path, timers, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture
+) -> None:
+    """A plant that is killed, with nobody beside it who would notice."""
+    monkeypatch.setattr(recorder_node, 'GONE', -1.0)
+    with program() as made:
+        node = recorder_in(made, tmp_path / 'bag', strict=False, duration=0.2)
+        timers[0]()
+        odometry = made.node.create_publisher(topics.ODOM.type, 'odom', 10)
+        made.node.create_publisher(topics.WRENCH.type, 'wrench', 10)
+        give_steps(node, *range(15))
+        made.spin(0.3)
+        timers[0]()
+        assert node.exit_code is None, 'it may only be silent for a while'
+        made.node.destroy_publisher(odometry)
+        made.until(lambda: not made.node.count_publishers('odom'), 'its end')
+        timers[0]()
+        assert node.exit_code == 1
+        made.drop(node)
+    assert 'came to step 14 of 20: nobody publishes odom any more' in capfd.readouterr().err
+    assert read_bag(tmp_path / 'bag', decode=False).counts['/odom'] == 15

@@ -88,6 +88,10 @@ class StepLedger:
         """Stamp of that step."""
         return self._origin + self.complete * self._step
 
+    def short_of(self, last: int) -> list[str]:
+        """Topics that have not come to a step."""
+        return [topic for topic, k in self._newest.items() if k < last]
+
     def behind(self) -> str:
         """Topics that have not reached the furthest one, for a message to a person."""
         steps = self._newest.items()
@@ -126,6 +130,7 @@ class PublicationLedger:
 
 
 PATIENCE = 2.0  # s without any step, after which what lacks at the end does not come any more
+GONE = 10.0  # s without any step, after which who left is not waited for beyond the run's time
 NUMBERED = {*topics.STEP_TOPICS, *topics.ANALYSIS_TOPICS, topics.CLOCK}  # with one publisher each
 TIMED = {*topics.STEP_TOPICS, topics.CLOCK}  # whose stamp is the log time, and the publish time
 
@@ -149,7 +154,7 @@ class RecorderNode(BulkNode):
         self._time = GraphClock(self, p.strict)
         awaited = (topics.CLOCK, *topics.ANALYSIS_TOPICS)
         self._newest = {topic.name: -1 for topic in awaited}  # stamps, ns
-        self._heard = 0.0  # steady s of the last step
+        self._heard = self._began = 0.0  # steady s of the last step and of the first
         self._reported = -1
         self._complaints: set[str] = set()
         self.graph = NodeInterface(self, barrier=False, lockstep=p.strict)
@@ -232,6 +237,7 @@ class RecorderNode(BulkNode):
         try:
             if step_topic:
                 self._heard = time.monotonic()
+                self._began = self._began or self._heard
                 self._ledger.add(step_topic, ns)
             self._publications.add(name, number)
         except LostStepError as error:
@@ -247,6 +253,9 @@ class RecorderNode(BulkNode):
             self._say_progress()
         if self._last is not None and self._is_whole(self._last):
             self._end()
+        elif self._last is not None and (gone := self._gone(self._last)):
+            names = f'nobody publishes {", ".join(gone)} any more'
+            self._end(f'came to step {self._ledger.complete} of {self._last}: {names}')
 
     def _is_whole(self, last: int) -> bool:
         """Whether all has come to the last step, or what need not come has stayed away.
@@ -261,6 +270,13 @@ class RecorderNode(BulkNode):
             reached = self._ledger.reaches(last, newest[topics.CLOCK.name])
             return late and not self._settings.strict and reached
         return late or not 0 <= newest[topics.CLOCK.name] < self._ledger.complete_ns
+
+    def _gone(self, last: int) -> list[str]:
+        """Topics whose publishers have gone before the last step, once its time has passed."""
+        now = time.monotonic()
+        over = now - self._began > last * self._settings.step and now - self._heard > GONE
+        short = self._ledger.short_of(last) if over and self._began else ()
+        return [topic for topic in short if not self.count_publishers(topic)]
 
     def _say_progress(self) -> None:
         if self._reported >= 0:

@@ -276,7 +276,8 @@ class RecorderNode(BulkNode):
         now = time.monotonic()
         over = now - self._began > last * self._settings.step and now - self._heard > GONE
         short = self._ledger.short_of(last) if over and self._began else ()
-        return [topic for topic in short if not self.count_publishers(topic)]
+        names = {topic: self.resolve_topic_name(topic) for topic in short}
+        return [topic for topic, name in names.items() if not self.count_publishers(name)]
 
     def _say_progress(self) -> None:
         if self._reported >= 0:

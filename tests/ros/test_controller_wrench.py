@@ -21,6 +21,7 @@ from reference_cases import off_centre
 from std_srvs.srv import Trigger
 
 from auv_dynamics.ros import topics
+from auv_gvc_controller.control.controller import FEWEST
 from auv_gvc_controller.nodes.controller_node import ControllerNode
 
 STEP = 20_000_000
@@ -429,6 +430,22 @@ def test_an_answer_that_is_held_back_is_zero_where_the_controller_leaves(
     assert {tuple(by_hand.six_of(message)) for message in made.heard['wrench']} == {(0.0,) * 6}
     assert by_hand.ns_of(made.heard['wrench'][0]) == 3 * STEP
     assert not re.search('takes over|lets go', capfd.readouterr().err)
+
+
+def test_in_real_time_a_law_begins_once_it_is_heard(made, vehicle) -> None:
+    """Beside a vehicle that says odometry already, a recorder that comes late is waited for."""
+    node = controller(made, vehicle, 'gvc', **BESIDE, expected_subscribers=['wrench=2'])
+    ship = Vehicle(made)
+    ship.until(lambda: node._held is not None and not node._controller.watchdog, 'an answer')
+    for _ in range(50):
+        ship.step()
+    assert not made.heard['wrench'], 'one of two listens'
+    made.listen(topics.WRENCH)
+    ship.until(lambda: len(made.heard['wrench']) > 2, 'what is published')
+    first, second = (np.abs(by_hand.six_of(one)) for one in made.heard['wrench'][:2])
+    assert not first.any()
+    assert (second <= np.array(BESIDE['limits.wrench']) / FEWEST).all()
+    assert node._controller.trips == 0
 
 
 def test_in_real_time_what_came_before_an_activation_is_not_obeyed(made, vehicle) -> None:

@@ -163,6 +163,12 @@ class VelocityController:
         if self._in_charge:
             self._output.restart()
 
+    def unheard(self) -> None:
+        """Begin anew with the next odometry: nobody was told the answer to this one."""
+        self._law.reset()
+        self._output.drop()
+        self._in_charge = False
+
     def odometry(self, ns: int, x: tuple[float, ...], now: Now = UNTIMED) -> Answer | None:
         """Take an odometry.
 

@@ -365,8 +365,10 @@ class ControllerNode(BulkMixin, LifecycleNode):
         if answer is None:
             return
         self._held = None if self.graph.ready() else (answer, leaves)
-        if self._held is not None:
-            return  # until the expected subscribers have matched; see _watch
+        if self._held is not None:  # until the expected subscribers have matched; see _watch
+            if not self._settings.lockstep:
+                self._controller.unheard()
+            return
         if not leaves:
             self._tell(answer.trouble)
         elif self._follows:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from helpers.node_processes import PATIENCE, Peer, fresh_domain
 from rclpy.context import Context
@@ -14,9 +15,10 @@ from rclpy.task import Future
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
-from auv_dynamics.files.errors import InputError, on_signals
+from auv_dynamics.files.errors import FailedError, InputError, on_signals
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.participant import Participant, Watcher
+from auv_dynamics.ros.rclpy_internals import RCLError
 from auv_dynamics.ros.security import loopback
 
 CALLS: list[tuple[str, str, Callable[[Watcher], Any]]] = [
@@ -48,6 +50,15 @@ def peer(graph: Watcher) -> Iterator[Peer]:
     made = Peer(graph._context.get_domain_id())
     yield made
     made.close()
+
+
+def test_where_ros_does_not_start_one_line_says_why(monkeypatch) -> None:
+    def fail(**_: Any) -> None:
+        raise RCLError("Failed to create log directory '/home/nobody/.ros/log': 2\nat a line")
+
+    monkeypatch.setattr(rclpy, 'init', fail)
+    with pytest.raises(FailedError, match=r"^ROS does not start: Failed .*/nobody/.ros/log': 2$"):
+        Watcher(7)
 
 
 def test_who_cannot_be_made_leaves_the_domain() -> None:

@@ -15,10 +15,11 @@ from rclpy.utilities import try_shutdown
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
-from auv_dynamics.files.errors import undisturbed
+from auv_dynamics.files.errors import FailedError, first_line, undisturbed
 from auv_dynamics.ros import interface
 from auv_dynamics.ros.endpoints import observes
 from auv_dynamics.ros.node_interface import ASK_AGAIN
+from auv_dynamics.ros.rclpy_internals import RCLError
 from auv_dynamics.ros.security import enclave, require
 from auv_dynamics.ros.topics import DIAGNOSTICS, PROGRESS, one_at_a_time
 
@@ -37,6 +38,7 @@ class Participant:
     Raises
     ------
     InputError : DDS security is asked for and cannot be had
+    FailedError : ROS does not start, as without a folder for its logs
 
     """
 
@@ -44,12 +46,15 @@ class Participant:
     def __init__(self, domain: int, make: Callable[[Context], Any], executable: str = 'auv'):
         require(executable)
         self._context = Context()
-        rclpy.init(
-            args=enclave(executable),
-            context=self._context,
-            domain_id=domain,
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
+        try:
+            rclpy.init(
+                args=enclave(executable),
+                context=self._context,
+                domain_id=domain,
+                signal_handler_options=SignalHandlerOptions.NO,
+            )
+        except RCLError as error:
+            raise FailedError(f'ROS does not start: {first_line(error)}') from None
         try:
             self._node = make(self._context)
         except BaseException:

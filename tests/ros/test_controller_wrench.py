@@ -1,5 +1,6 @@
 """The wrench of the controller node, to its last digits that of the independent implementation."""
 
+import json
 import re
 import time
 from collections.abc import Callable, Iterator
@@ -161,6 +162,16 @@ def test_a_law_that_is_changed_while_inactive_is_taken(made, vehicle) -> None:
     answers_as(made, 'cl', PER_AXIS, STEPS)
     change(node, law='gvc', gains__k_D=[7.0])
     answers_as(made, 'gvc', PER_AXIS | {'k_D': [7.0]}, 2 * STEPS)
+
+
+@pytest.mark.parametrize(('before', 'after'), [('gvc', 'pid'), ('pid', 'smc'), ('smc', 'cl')])
+def test_a_law_with_other_gains_is_taken_while_inactive(made, vehicle, before, after) -> None:
+    node = controller(made, vehicle, before)
+    answers_as(made, before, LAWS[before], 0)
+    gains = {f'gains__{gain}': list(map(float, row)) for gain, row in LAWS[after].items()}
+    change(node, law=after, **gains)
+    answers_as(made, after, LAWS[after], STEPS)
+    assert json.loads(node.graph.facts['gains']) == LAWS[after]
 
 
 def test_in_lock_step_odometry_of_an_inactive_one_is_answered_once_it_is_active(made, vehicle):

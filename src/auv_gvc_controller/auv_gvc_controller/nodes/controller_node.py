@@ -123,11 +123,15 @@ class ControllerParameters:
 
     def _gains(self, law: str) -> dict[str, Any]:
         values = {}
+        known = law_class(law)
         given_here = (name.removeprefix(GAIN) for name in given(self._node, GAIN))
-        for gain in {*law_class(law)._fields, *given_here}:
+        for gain in {*known._fields, *given_here}:
             parameter = self._node.get_parameter_or(f'{GAIN}{gain}', None)
             if parameter is not None and parameter.type_ != Parameter.Type.NOT_SET:
                 values[gain] = list(parameter.value)
+        needed = {*known._fields} - getattr(known, '_field_defaults', {}).keys()
+        if law != self._named and values.keys() >= needed:  # others are of the law at the start
+            values = {gain: value for gain, value in values.items() if gain in known._fields}
         return values
 
     def refuse_while(self, active: bool, parameters: list[Parameter]) -> SetParametersResult:

@@ -70,10 +70,12 @@ def write_manifest(folder: Path, files: Mapping[str, str]) -> None:
 
 def discard(left: Path) -> None:
     """Remove what a command that failed has left, where a manifest lists it and it is the same."""
-    listed = listed_in(left) or {}
+    known = listed_in(left) or {}
+    listed = [name for name in known if os.path.lexists(left / name)]
     with suppress(OSError):
-        if all(not has_links(left, n) and sha256_of(left / n) == listed[n] for n in listed):
-            remove(left, listed)
+        if all(not has_links(left, n) and sha256_of(left / n) == known[n] for n in listed):
+            half = [n for n in paths_in(left) if fnmatchcase(Path(n).name, f'.*{UNFINISHED}')]
+            remove(left, [*listed, *(half if listed else ())])
 
 
 def remove(folder: Path, names: Iterable[str]) -> None:

@@ -3,9 +3,11 @@
 import hashlib
 import json
 import platform
+import shutil
 from importlib import metadata
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
 import yaml
 from helpers.sweeps import (
@@ -62,6 +64,39 @@ def test_part_that_is_missing_or_broken_is_made_again(files: Path) -> None:
     assert run(files).before == ROLLOUTS - 10
     assert parts(files / 'out') == before
     assert not list((files / 'out').glob('.sweep*'))
+
+
+def test_part_in_which_a_byte_has_changed_is_made_again(files: Path, capsys) -> None:
+    with pytest.raises(SweepStoppedError):
+        run(files, Interrupted(after=2), ahead=1)
+    before = parts(files / 'out')
+    changed = files / 'out/rollouts/part-00000000.parquet'
+    contents = bytearray(changed.read_bytes())
+    contents[len(contents) // 3] ^= 1  # in the columns that nothing of a sweep reads again
+    changed.write_bytes(contents)
+    text = (files / 'campaign.yaml').read_text()
+    (files / 'campaign.yaml').write_text(text.replace('seed: 11', 'seed: 12'))
+    with pytest.raises(InputError, match='seed'):
+        run(files)  # and does not list it as it is now
+    (files / 'campaign.yaml').write_text(text)
+    assert run(files).before == 5 * (len(before) - 1)
+    assert f'warning: {changed}: not as it was written' in capsys.readouterr().err
+    assert before.items() <= parts(files / 'out').items()
+
+
+def test_what_a_killed_sweep_has_finished_is_listed(files: Path) -> None:
+    run(files)
+    campaign = load_campaign(files / 'campaign.yaml')
+    with sweep_folder(files / 'out', campaign, overwrite=True) as folder:
+        folder.store(0, pa.table({'index': [0]}))
+        shutil.copytree(folder.folder, files / 'killed')
+    (files / 'killed/rollouts/.part-00000001.parquet.unfinished').write_bytes(b'half')
+    run(files, out='other')
+    shutil.copytree(files / 'killed', files / 'other/unfinished')
+    run(files, out='other', overwrite=True)
+    assert not (files / 'other/unfinished').exists()
+    run(files, out='killed', overwrite=True)
+    assert len(parts(files / 'killed')) == len(parts(files / 'other')) + 1  # and what is half
 
 
 def test_a_sweep_does_not_go_on_with_another_set_point(files: Path) -> None:

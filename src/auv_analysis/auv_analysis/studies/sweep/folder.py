@@ -1,9 +1,11 @@
 """The folder of a sweep: what it was made of, and the parts that are finished.
 
 Whatever is in it under its final name is complete: everything is written under another name,
-flushed to the disk and then renamed. A process may therefore be killed at any time.
+flushed to the disk and then renamed, a part once the manifest of the folder lists its digest. A
+process may therefore be killed at any time.
 """
 
+import hashlib
 import json
 import platform
 import sys
@@ -16,13 +18,18 @@ from typing import TYPE_CHECKING, Any
 
 from auv_analysis.output.folder import (
     CAMPAIGN,
+    MANIFEST,
     PART,
     ROLLOUTS,
     SWEEP,
     ResultsFolder,
+    listed_in,
     results_folder,
+    sha256_of,
+    write_manifest,
 )
 from auv_analysis.output.new_files import UNFINISHED, write
+from auv_analysis.output.progress import say
 from auv_analysis.studies.sweep.campaign import Campaign
 from auv_analysis.studies.sweep.variation import kind_of
 from auv_dynamics.files.errors import InputError
@@ -48,15 +55,17 @@ def sweep_folder(out: Path, campaign: Campaign, *, overwrite: bool) -> Iterator[
     InputError : it holds another sweep or something else, is in use or cannot be written
 
     """
-    begun = not overwrite and _stored(out) is not None
+    manifest, stored = _manifest(campaign), None if overwrite else _stored(out)
+    if stored is not None:
+        _refuse_other(out, stored, {**manifest, 'block': stored['block']})
     with results_folder(
         out,
         overwrite=overwrite,
         own=[f'{ROLLOUTS}/part-*.parquet'],
         inputs=campaign.inputs,
-        begun=begun,
+        begun=stored is not None,
     ) as results:
-        yield SweepFolder(results, campaign)
+        yield SweepFolder(results, campaign, stored or {**manifest, 'block': campaign.block})
 
 
 class SweepFolder:
@@ -71,21 +80,30 @@ class SweepFolder:
 
     """
 
-    def __init__(self, results: ResultsFolder, campaign: Campaign):
+    def __init__(self, results: ResultsFolder, campaign: Campaign, manifest: dict[str, Any]):
         self.folder, self.out = results
         self.data = self.folder / ROLLOUTS
-        manifest, stored = _manifest(campaign), _stored(self.folder)
-        self.new = stored is None
-        if stored is None:
-            stored = {**manifest, 'block': campaign.block}
-            write(self.folder / SWEEP, json.dumps(stored, indent=1).encode())
-        self.block = stored.pop('block')
-        _refuse_other(self.folder, stored, manifest)
+        self.new = not (self.folder / SWEEP).exists()
+        if self.new:
+            write(self.folder / SWEEP, json.dumps(manifest, indent=1).encode())
+        self.block = manifest['block']
         self.data.mkdir(exist_ok=True)
         for folder in (self.folder, self.data):
             for unfinished in folder.glob(f'.*{UNFINISHED}'):
                 unfinished.unlink()
-        _write_inputs(self.folder, campaign)
+        self._digests = listed_in(self.folder) or {}
+        self._digests.pop(MANIFEST, None)
+        for name in (SWEEP, *_write_inputs(self.folder, campaign)):
+            self._digests[name] = sha256_of(self.folder / name)
+        self._drop_changed()
+
+    def _drop_changed(self) -> None:
+        """Remove parts that are no more what was written: they are made again."""
+        for _, path in sorted(self._parts()):
+            found = sha256_of(path)
+            if self._digests.setdefault(_name(path), found) != found:
+                say(f'warning: {path}: not as it was written: made again')
+                path.unlink()
 
     def finished(self, columns: list[str]) -> Iterator[tuple[int, 'pa.Table']]:
         """Number and some columns of each finished block; what cannot be read is not finished."""
@@ -117,7 +135,14 @@ class SweepFolder:
         words = [field.name for field in table.schema if pa.types.is_string(field.type)]
         options = {'compression': 'zstd', 'use_dictionary': words, 'write_statistics': False}
         pq.write_table(table, sink, **options)  # what is asked of a sweep is asked of all its rows
-        write(self.data / f'part-{block:08d}.parquet', sink.getvalue())
+        path, contents = self.data / f'part-{block:08d}.parquet', sink.getvalue()
+        self._digests[_name(path)] = hashlib.sha256(contents).hexdigest()
+        write_manifest(self.folder, self._digests)
+        write(path, contents)
+
+
+def _name(part: Path) -> str:
+    return f'{ROLLOUTS}/{part.name}'
 
 
 def _manifest(campaign: Campaign) -> dict[str, Any]:
@@ -146,15 +171,16 @@ def _sampling_versions(campaign: Campaign) -> dict[str, str]:
     return {package: metadata.version(package) for package in packages}
 
 
-def _write_inputs(out: Path, campaign: Campaign) -> None:
-    """Texts for people: the manifest alone is read again."""
+def _write_inputs(out: Path, campaign: Campaign) -> list[str]:
+    """Write texts for people, which are not read again; their names."""
     from auv_analysis.scenario.scenario import write_inputs
 
-    write_inputs(campaign.scenario, out)
+    names = list(write_inputs(campaign.scenario, out))
     header = f'# {campaign.path.name} with every default filled in\n'
     resolved = {**campaign.data, 'scenario': 'scenario.yaml'}
     text = yaml_text(resolved)
     write(out / CAMPAIGN, (header + text).encode())
+    return [*names, CAMPAIGN]
 
 
 def _stored(out: Path) -> dict[str, Any] | None:
@@ -211,7 +237,6 @@ def versions() -> dict[str, str]:
 
 def laws_of(campaign: Campaign) -> dict[str, str]:
     """Digest of the source file of each user's own law."""
-    import hashlib
     import inspect
 
     found = {}

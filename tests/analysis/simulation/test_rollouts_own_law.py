@@ -38,7 +38,7 @@ class PI(NamedTuple):
 BRANCHES = """if nu[0] > 0.05:
             nu_d = nu"""
 NOT_FOR_NUMBA = "assert isinstance({'a': 1, 2: 'b'}, dict)"
-FAILS = """if t > 0.1:
+FAILS = """if t > 0.1 and gains.k_P[0] > 500.0:
             raise KeyError('lost')"""
 GAINS = np.geomspace(50.0, 400.0, 9)
 
@@ -85,9 +85,13 @@ def test_a_law_runs_as_compiled_as_can_be(scenario, name, before, how):
 
 
 @pytest.mark.long
-def test_a_law_that_fails_is_named(scenario):
-    with pytest.raises(ArithmeticError, match="the law PI failed: KeyError: 'lost'"):
-        rollouts(scenario('own_failing', FAILS), 'own', {})
+def test_a_law_that_fails_is_named_in_its_row(scenario):
+    base = scenario('own_failing', FAILS)
+    columns = rollouts(base, 'own', {'controllers.own.k_P': [300.0, 900.0, 400.0]})
+    assert columns['status'].tolist() == ['ok', 'refused', 'ok']
+    assert columns['reason'][1] == "the law PI failed: KeyError: 'lost'"
+    alone = rollouts(base, 'own', {'controllers.own.k_P': [400.0]})
+    assert alone['effort.rms.surge'] == columns['effort.rms.surge'][2:]
 
 
 @pytest.mark.parametrize('error', [AssertionError('register'), KeyError('x'), RuntimeError('a\nb')])

@@ -116,5 +116,5 @@ def _conclude(campaign: Campaign, out: Path, outcome: Outcome) -> dict[str, Any]
         'paths': list(campaign.values(0, 1)),
     }
     if refused == rows:
-        raise FailedError('every rollout was refused: its values make no scenario', document)
+        raise FailedError('every rollout was refused', document)
     return document

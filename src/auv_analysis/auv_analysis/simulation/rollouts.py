@@ -52,7 +52,8 @@ def rollouts(
 
     Returns
     -------
-    columns : name -> (B,). `status` is 'ok', 'diverged' or 'refused', `reason` says why, and
+    columns : name -> (B,). `status` is 'ok', 'diverged' or 'refused' (values that make no
+        scenario, or a user's law that failed under way), `reason` says why, and
         `diverged_at` is the time in s of the first sample that is not finite; then the figures of
         `summary.json`, such as `velocity_error.rms.surge`. NaN is what does not exist.
 
@@ -72,15 +73,28 @@ def rollouts(
     result: dict[str, np.ndarray] = {name: np.full(count, np.nan) for name in COLUMNS}
     result |= {'status': np.full(count, 'refused', object), 'reason': np.full(count, '', object)}
     for variants in _batches(scenario, controller, given, count, result['reason']):
-        batch = batch_of(variants, hold)
-        found = columns(run_batch(batch, threads), batch.steps + 1, batch.step)
-        for name, values in found.items():
-            result[name][variants.rows] = values
-        diverged = np.isfinite(found['diverged_at'])
-        result['status'][variants.rows] = np.where(diverged, 'diverged', 'ok')
-        times = [f'not finite from t = {t:g} s' for t in found['diverged_at'][diverged]]
-        result['reason'][variants.rows[diverged]] = times
+        _run(variants, hold, threads, result)
     return {name: result[name] for name in ('status', 'reason', *COLUMNS)}
+
+
+def _run(variants: Variants, hold: Hold, threads: int, result: Mapping[str, np.ndarray]) -> None:
+    """Put figures where they belong; where a user's law fails, each rollout runs alone."""
+    batch, rows = batch_of(variants, hold), variants.rows
+    try:
+        found = columns(run_batch(batch, threads), batch.steps + 1, batch.step)
+    except ArithmeticError as error:
+        if len(rows) == 1:
+            result['reason'][rows] = str(error)
+        else:
+            for row in rows:
+                _run(variants.part(rows == row), hold, threads, result)
+        return
+    for name, values in found.items():
+        result[name][rows] = values
+    diverged = np.isfinite(found['diverged_at'])
+    result['status'][rows] = np.where(diverged, 'diverged', 'ok')
+    times = [f'not finite from t = {t:g} s' for t in found['diverged_at'][diverged]]
+    result['reason'][rows[diverged]] = times
 
 
 def _array(values: Sequence[Any] | np.ndarray) -> np.ndarray:

@@ -124,7 +124,7 @@ def six_signals(signal: str, run: RunDigest, zeros: Sequence[str] = ()) -> Drawn
         caption.append(f'Zero throughout this run and not drawn: {join(still)}.')
     caption.append(without)
     caption.append(plots.shade_sentence(run).strip())
-    figure = (_split_panels if split else _whole_panels)(run, signal, quantity, drawn)
+    figure = _panels(run, signal, quantity, drawn, split=split)
     return figure, title, ' '.join(filter(None, caption))
 
 
@@ -188,32 +188,23 @@ def _groups(columns: Sequence[int]) -> list[list[int]]:
     return [members for members in split if members]
 
 
-def _split_panels(run: RunDigest, signal: str, quantity: Quantity, drawn: Sequence[int]) -> Figure:
-    groups = _groups(drawn)
-    figure = plots.new_figure(2.15 * len(groups) + 0.25)
-    grid = figure.subplots(len(groups), 2, squeeze=False, width_ratios=(1, 1.9))
+def _panels(
+    run: RunDigest, signal: str, quantity: Quantity, drawn: Sequence[int], *, split: bool
+) -> Figure:
+    """A row of linear and one of angular signals, whole or in the two phases of the time."""
+    groups, parts = _groups(drawn), ('early', 'late') if split else ('whole',)
+    height, ratios = (2.15, (1, 1.9)) if split else (2.0, (1,))
+    figure = plots.new_figure(height * len(groups) + 0.25)
+    shape = len(groups), len(parts)
+    grid = figure.subplots(*shape, squeeze=False, sharex=not split, width_ratios=ratios)
     for row, columns in enumerate(groups):
-        for column, part in enumerate(('early', 'late')):
-            axes = grid[row, column]
-            draw_lines(axes, run, signal, part, columns)
-            plots.letter(axes, 2 * row + column)
+        for column, part in enumerate(parts):
+            draw_lines(grid[row, column], run, signal, part, columns)
+            plots.letter(grid[row, column], len(parts) * row + column)
         grid[row, 0].set_ylabel(quantity.axis(columns))
-        plots.key(grid[row, 1], quantity, columns)
+        plots.key(grid[row, -1], quantity, columns)
     for axes in grid[-1]:
         axes.set_xlabel('$t$ (s)')
-    return figure
-
-
-def _whole_panels(run: RunDigest, signal: str, quantity: Quantity, drawn: Sequence[int]) -> Figure:
-    groups = _groups(drawn)
-    figure = plots.new_figure(2.0 * len(groups) + 0.25)
-    grid = figure.subplots(len(groups), 1, squeeze=False, sharex=True).ravel()
-    for row, columns in enumerate(groups):
-        draw_lines(grid[row], run, signal, 'whole', columns)
-        grid[row].set_ylabel(quantity.axis(columns))
-        plots.letter(grid[row], row)
-        plots.key(grid[row], quantity, columns)
-    grid[-1].set_xlabel('$t$ (s)')
     return figure
 
 

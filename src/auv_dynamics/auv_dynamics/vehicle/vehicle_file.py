@@ -133,14 +133,12 @@ class _Source:
         return (A + A.T) / 2
 
     def inertia_matrix(self) -> np.ndarray:
-        for key, where in (('added_mass', self._data), ('inertia', self._data['rigid_body'])):
-            if key in where:
-                name = key if where is self._data else f'rigid_body.{key}'
-                found = 'both' if key == 'added_mass' else 'both of them'
-                raise InputError(self._file, name, 'nothing beside inertia_matrix', found)
-        if 'inertia_reference' in self._data['rigid_body']:
-            name = 'rigid_body.inertia_reference'
-            raise InputError(self._file, name, 'nothing beside inertia_matrix', 'both of them')
+        expected = 'nothing beside inertia_matrix'
+        if 'added_mass' in self._data:
+            raise InputError(self._file, 'added_mass', expected, 'both')
+        for key in ('inertia', 'inertia_reference'):
+            if key in self._data['rigid_body']:
+                raise InputError(self._file, f'rigid_body.{key}', expected, 'both of them')
         return self._symmetric('inertia_matrix', matrix6(self._data['inertia_matrix']))
 
     def rigid_body(self, mass: float, r_G: np.ndarray) -> np.ndarray:

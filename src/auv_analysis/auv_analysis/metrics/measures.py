@@ -4,19 +4,20 @@ A column is named like its keys in `summary.json`, such as `velocity_error.rms.s
 a comparison, of a rollout in a sweep.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any, Literal
 
 import numpy as np
 
-from auv_analysis.metrics.quantities import METRICS, quantity
+from auv_analysis.metrics.quantities import HALVES, METRICS, quantity
 from auv_analysis.metrics.summary import SETTLED
 from auv_dynamics.vehicle import DOFS
 
 MATRICES = ('gains.K_D', 'gains.K_f')
-FAMILIES = {name: METRICS[name] for name in METRICS if name != 'kinetic_energy.mean'}
+TOTAL = 'kinetic_energy.mean'
+FAMILIES = {name: METRICS[name] for name in METRICS if name != TOTAL}
 
 
 @dataclass(frozen=True)
@@ -49,34 +50,18 @@ class Measure:
         return reduce(np.maximum, values)
 
 
-def _halves(family: str, rule: Literal['norm', 'largest']) -> list[Measure]:
+def _halves(family: str, rule: Literal['norm', 'largest']) -> Iterator[Measure]:
     """Measures of the linear and of the angular columns of a family."""
-    found, entry = [], FAMILIES[family]
     sums_up = 'of the vector of the three' if rule == 'norm' else 'the largest of the three'
-    for word, unit, dofs in zip(
-        ('linear', 'angular'), entry.units, (DOFS[:3], DOFS[3:]), strict=True
-    ):
-        found.append(
-            Measure(
-                f'overall.{family}.{word}',
-                f'{entry.label}, {word}',
-                unit,
-                f'{entry.meaning}; {sums_up} {word} degrees of freedom',
-                tuple(f'{family}.{dof}' for dof in dofs),
-                rule,
-            )
-        )
-    return found
+    for word, dofs in HALVES.items():
+        half, columns = FAMILIES[family].of(word), tuple(f'{family}.{dof}' for dof in dofs)
+        meaning = f'{half.meaning}; {sums_up} {word} degrees of freedom'
+        yield Measure(f'overall.{family}.{word}', half.label, half.unit, meaning, columns, rule)
 
 
 MEASURES = (
     Measure(
-        'kinetic_energy.mean',
-        'kinetic energy',
-        'J',
-        'mean kinetic energy ½ νᵀ M ν over its window',
-        ('kinetic_energy.mean',),
-        'only',
+        TOTAL, METRICS[TOTAL].label, METRICS[TOTAL].unit, METRICS[TOTAL].meaning, (TOTAL,), 'only'
     ),
     Measure(
         'overall.velocity_error.settling_time',

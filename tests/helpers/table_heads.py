@@ -161,9 +161,9 @@ def _labels(column: str) -> list[str]:
 
 
 def _part(name: str) -> str:
-    from auv_analysis.studies.design.change import part_words
+    from auv_analysis.studies.design.change import PART_WORDS
 
-    return part_words(name)
+    return PART_WORDS[name]
 
 
 def _said(value: Any, words: str) -> bool:

@@ -15,6 +15,9 @@ from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 SHIFT, BALLAST, DISC_PART = 'shift', 'ballast', 'disc'
 PARTS = (SHIFT, BALLAST, DISC_PART)
 ALL = 'all'
+PART_WORDS = {  # of the heads of tables
+    SHIFT: 'centre of gravity', BALLAST: 'trimmed ballast', DISC_PART: 'disc', ALL: 'all together',
+}  # fmt: skip
 NAMES = (
     'shift.x', 'shift.y', 'shift.z',
     'ballast.mass', 'ballast.x', 'ballast.y', 'ballast.z',
@@ -376,13 +379,3 @@ def values_of(x: np.ndarray) -> dict[str, float]:
     """Parameters of the parts that a change (13,) changes, by name."""
     parts = parts_of(x)
     return {n: float(v) for n, v in zip(NAMES, x, strict=True) if n.split('.')[0] in parts}
-
-
-def part_words(part: str) -> str:
-    """A part, or all of them, as a head of a table says it."""
-    return {
-        'shift': 'centre of gravity',
-        'ballast': 'trimmed ballast',
-        'disc': 'disc',
-        'all': 'all together',
-    }[part]

@@ -18,7 +18,7 @@ from auv_analysis.report.results import (
     document_table,
     terminal,
 )
-from auv_analysis.studies.design.change import part_words
+from auv_analysis.studies.design.change import PART_WORDS
 from auv_analysis.studies.design.plots import draw_design
 from auv_analysis.studies.design.prediction import AT_REST, OTHERS, SIZE
 from auv_analysis.studies.design.results import DesignStudy
@@ -224,7 +224,7 @@ def matrix_table(results: Results) -> Table:
         'coupling': described('', 'coupling that the change was made for'),
         **{
             part: described(
-                part_words(part), 'of it left, largest magnitude; –: cannot be run',
+                PART_WORDS[part], 'of it left, largest magnitude; –: cannot be run',
                 decimals=1, scale=100.0, kind=f'kind {part}',
             )
             for part in parts
@@ -242,7 +242,7 @@ def alternatives_table(results: Results) -> Table:
     reduced = results.facts['reduce']
     rows = [
         {
-            'part': part_words(one['part']),
+            'part': PART_WORDS[one['part']],
             **{key: ('alternatives', i, key) for key in ('predicted', 'ratio', 'score')},
             'values': ', '.join(f'{n} {plain(v, 5)}' for n, v in one['values'].items()) or 'none',
             'mark': one['failure'] or ('proposed' if one['proposed'] else ''),

@@ -107,12 +107,8 @@ def write_report(
 
 def _shared_by(runs: Mapping[str, RunDigest], texts: Texts) -> list[tuple[tuple[str, ...], str]]:
     """Names of the runs that share a text, and that text."""
-    if isinstance(texts, str):
-        return [(tuple(runs), texts)]
-    names: dict[str, list[str]] = {}
-    for name in runs:
-        names.setdefault(texts.get(name, ''), []).append(name)
-    return [(tuple(members), text) for text, members in names.items()]
+    of_runs = ((name, texts if isinstance(texts, str) else texts.get(name, '')) for name in runs)
+    return [(tuple(names), text) for names, text in tables.shared(of_runs)]
 
 
 def _listings(runs: Mapping[str, RunDigest], what: str, texts: Texts) -> list[tuple[str, str]]:

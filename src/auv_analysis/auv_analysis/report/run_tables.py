@@ -1,6 +1,6 @@
 """Tables of a report of runs, along the paper's procedure: views of `summary.json`."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -125,33 +125,29 @@ def _matrix(name: str, caption: str, values: Any, *where: str, digits: int = 4) 
     return make_table(name, caption, rows, shown, pointer=at)
 
 
+def shared(of_runs: Iterable[tuple[str, Any]]) -> list[tuple[list[str], Any]]:
+    """Names that have something in common, and what that is, in the order of the first ones."""
+    found: list[tuple[list[str], Any]] = []
+    for name, value in of_runs:
+        same = next((names for names, known in found if known == value), None)
+        if same is None:
+            found.append(([name], value))
+        else:
+            same.append(name)
+    return found
+
+
 def decompositions(
     runs: Mapping[str, RunInfo], summaries: Summaries
 ) -> list[tuple[list[str], Mapping[str, Any]]]:
     """Runs that share a decomposition, and that decomposition."""
-    found: list[tuple[list[str], Mapping[str, Any]]] = []
-    for name in runs:
-        parts = summaries[name]['decomposition']
-        same = [names for names, known in found if known == parts]
-        if same:
-            same[0].append(name)
-        else:
-            found.append(([name], parts))
-    return found
+    return shared((name, summaries[name]['decomposition']) for name in runs)
 
 
 def _body_gains(summaries: Summaries) -> list[tuple[str, list[str], Any]]:
     """K_D and K_f, once for those that share them."""
-    found: list[tuple[str, list[str], Any]] = []
-    for name, summary in summaries.items():
-        for symbol in SYMBOLS:
-            gain = summary['gains'][symbol]
-            same = [names for s, names, known in found if (s, known) == (symbol, gain)]
-            if same:
-                same[0].append(name)
-            elif gain is not None:
-                found.append((symbol, [name], gain))
-    return found
+    every = ((n, (k, s['gains'][k])) for n, s in summaries.items() for k in SYMBOLS)
+    return [(symbol, names, K) for names, (symbol, K) in shared(every) if K is not None]
 
 
 def scalar_gains(summaries: Summaries) -> list[dict[str, Any]]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.metrics.summary import estimate_figures, lumped_error, settling_time
+from auv_analysis.metrics.summary import estimate_figures, settling_time
 
 
 @pytest.fixture(scope='module')
@@ -77,7 +77,6 @@ def test_a_run_without_gains_has_none(run):
 
 def test_without_set_points_or_a_disturbance_there_is_no_error_to_tell(run):
     blind = replace(run, disturbance=None, nu_d=np.full_like(run.nu_d, np.nan))
-    assert lumped_error(blind) is None
     summary = summarize(blind)
     assert set(summary['velocity_error'].values()) == {None}
     assert summary['velocity']['rms'] == summarize(run)['velocity']['rms']

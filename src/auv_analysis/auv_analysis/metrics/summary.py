@@ -124,11 +124,6 @@ def if_known(known: np.ndarray, values: Sequence[float | None]) -> list[float | 
     return [value if there else None for there, value in zip(known, values, strict=True)]
 
 
-def lumped_error(run: Run) -> np.ndarray | None:
-    """W = f - F in the body frame, (n + 1, 6) in N, N m; None where one of them is not known."""
-    return run.disturbance_estimate - run.disturbance if run.knows_disturbance else None
-
-
 def band_of(peak: np.ndarray) -> np.ndarray:
     """Band of a settled error for the peak (6,) of abs(nu_d), m/s and rad/s."""
     return np.maximum(BAND * peak, SMALLEST_BAND)

@@ -15,7 +15,7 @@ from zstandard import ZstdError
 
 from auv_analysis.bag.metadata import bag_files
 from auv_analysis.bag.reading import BagContents
-from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.errors import InputError, first_line
 from auv_dynamics.ros import interface
 
 MAGIC = b'\x89MCAP0\r\n'
@@ -71,9 +71,16 @@ def slow_read_bag(bag: str | Path) -> BagContents:
                     try:
                         decoder = DecoderFactory().decoder_for(record.message_encoding, schema)
                     except Exception as error:
-                        raise _refusal(path, record.topic, 'a schema of its type', error) from None
-                    if decoder is not None:
-                        decoders[record.id] = decoder
+                        found = f'one that cannot be read: {first_line(error)}'
+                        raise InputError(
+                            path, record.topic, 'a schema of its type', found
+                        ) from None
+                    if decoder is None:
+                        found = f'messages in {record.message_encoding}'
+                        found += f', a definition in {schema.encoding}' if schema.encoding else ''
+                        expected = 'cdr, with a definition in ros2msg'
+                        raise InputError(path, record.topic, expected, found)
+                    decoders[record.id] = decoder
             elif isinstance(record, Attachment):
                 contents.attachments[record.name] = record.data.decode('utf-8', 'replace')
             elif isinstance(record, Metadata):

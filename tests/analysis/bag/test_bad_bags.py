@@ -11,8 +11,10 @@ from helpers.foreign_bags import (
     write,
     write_chunks,
 )
+from mcap.writer import Writer as McapWriter
 
 from auv_analysis.bag.any_bag import survey
+from auv_analysis.bag.load import load_run
 from auv_analysis.bag.metadata import Definition, files_of, is_csv, is_mcap
 from auv_analysis.bag.output import Storage
 from auv_analysis.bag.writer import BagWriter
@@ -127,10 +129,8 @@ def test_results_must_not_overwrite_the_files_of_a_bag(kind, run, tmp_path) -> N
 
 
 def test_messages_of_another_definition_are_refused(run, tmp_path) -> None:
-    from mcap.writer import Writer
-
     path = tmp_path / 'x.mcap'
-    writer = Writer(str(path))
+    writer = McapWriter(str(path))
     writer.start(profile='ros2', library='test')
     for topic, kind in (('/o', 'nav_msgs/msg/Odometry'), ('/w', 'geometry_msgs/msg/Wrench')):
         schema = writer.register_schema(kind, 'ros2msg', b'float64 depth\n')
@@ -141,14 +141,24 @@ def test_messages_of_another_definition_are_refused(run, tmp_path) -> None:
         loaded(path, **KEYS)
 
 
+@pytest.mark.parametrize(('language', 'encoding'), [('ros2msg', 'json'), ('jsonschema', 'cdr')])
+def test_an_odometry_of_ours_that_nobody_can_decode_is_named(language, encoding, tmp_path) -> None:
+    writer = McapWriter(str(tmp_path / 'x.mcap'))
+    writer.start(profile='', library='test')
+    schema = writer.register_schema('nav_msgs/msg/Odometry', language, b'{}')
+    writer.add_message(writer.register_channel('/odom', encoding, schema), 0, b'{}', 0)
+    writer.finish()
+    found = f'found messages in {encoding}, a definition in {language}'
+    with pytest.raises(InputError, match=f'/odom: expected cdr, with .*, {found}'):
+        load_run(tmp_path / 'x.mcap')
+
+
 @pytest.mark.parametrize(
     ('language', 'encoding'), [('jsonschema', 'json'), ('protobuf', 'protobuf')]
 )
 def test_other_encodings_are_refused(language, encoding, tmp_path) -> None:
-    from mcap.writer import Writer
-
     path = tmp_path / 'x.mcap'
-    writer = Writer(str(path))
+    writer = McapWriter(str(path))
     writer.start(profile='', library='test')
     schema = writer.register_schema('nav_msgs/msg/Odometry', language, b'{}')
     other = writer.register_schema('geometry_msgs/msg/Wrench', language, b'{}')

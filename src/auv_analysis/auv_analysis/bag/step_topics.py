@@ -95,11 +95,14 @@ class Decoding:
         self._topics: dict[int, str] = {}
 
     def add(self, channel: Channel, schema: Schema | None) -> None:
-        """Learn to decode a channel, where its encoding is known."""
+        """Learn to decode a channel."""
         decoder = self._decoder(channel, schema)
-        if decoder is not None:
-            self._decoders[channel.id] = decoder
-            self._topics[channel.id] = channel.topic
+        if decoder is None:
+            found = f'messages in {channel.message_encoding}'
+            found += f', a definition in {schema.encoding}' * bool(schema and schema.encoding)
+            raise InputError(self._path, channel.topic, 'cdr, with a definition in ros2msg', found)
+        self._decoders[channel.id] = decoder
+        self._topics[channel.id] = channel.topic
 
     def _decoder(self, channel: Channel, schema: Schema | None) -> Decoder | None:
         """Decoder of a channel; channels of one definition share it."""
@@ -117,7 +120,8 @@ class Decoding:
                 with contextlib.redirect_stderr(io.StringIO()):  # its parser prints and raises
                     decoder = DecoderFactory().decoder_for(channel.message_encoding, schema)
             except Exception as error:  # whatever its parser stumbles over
-                raise refusal(self._path, channel.topic, 'a schema of its type', error) from None
+                found = f'one that cannot be read: {first_line(error)}'
+                raise InputError(self._path, channel.topic, 'a schema of its type', found) from None
             self._known[key] = decoder
         return self._known[key]
 

@@ -82,7 +82,7 @@ def test_window_of_the_energy(run, rows, first, last) -> None:
 def test_certificate_at_the_borders(run, rows, n, known, seed) -> None:
     """Bit for bit: derivative over nine samples, and z that is summed up from the start."""
     steps = np.random.default_rng(seed).uniform(0.005, 0.02, n)
-    part = replace(run.part(slice(0, n)), t=np.cumsum(steps))
+    part = replace(run.part(slice(0, n)), t=np.cumsum(steps) - steps[0], step=0.02)
     part = part if known else replace(part, law_state=None)
     model = control_model(part.vehicle)
     whole = certificate_of(part, model)

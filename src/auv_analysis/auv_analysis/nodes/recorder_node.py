@@ -154,7 +154,8 @@ class RecorderNode(BulkNode):
         self._time = GraphClock(self, p.strict)
         awaited = (topics.CLOCK, *topics.ANALYSIS_TOPICS)
         self._newest = {topic.name: -1 for topic in awaited}  # stamps, ns
-        self._heard = self._began = 0.0  # steady s of the last step and of the first
+        self._heard = 0.0  # steady s of the last step
+        self._began = 0.0  # of the first one
         self._reported = -1
         self._complaints: set[str] = set()
         self.graph = NodeInterface(self, barrier=False, lockstep=p.strict)

@@ -164,17 +164,15 @@ def _of_scenario(
     reasons: np.ndarray,
 ) -> Iterator[Variants]:
     """Rollouts that share all values but those in columns."""
+    packed = {path: column[rows] for path, column in together.items()}
+    good = np.zeros(len(rows), bool)
     try:
         base = changed_scenario(scenario, values) if values else scenario
         base.controller(controller)
-        fitting = {p for p, v in together.items() if in_columns(base, controller, p, v[rows])}
-    except InputError as error:
-        reasons[rows] = _reason(error)
-        return
-    packed = {path: column[rows] for path, column in together.items()}
-    if len(fitting) < len(together):  # a changed scenario may not take as columns what this took
-        good = np.zeros(len(rows), bool)
-    else:
+        fits = all(in_columns(base, controller, path, v) for path, v in packed.items())
+    except InputError:  # with the values in columns it may be a scenario
+        fits = False
+    if fits:
         seeds = packed.pop('seed', np.full(len(rows), base.data['seed']))
         variants, good = packed_variants(base, controller, packed, rows, seeds)
         if good.any():

@@ -108,6 +108,20 @@ def test_rows_that_settle_are_no_sample_of_the_design(tmp_path: Path, approved) 
     approved.add(results.notes)
 
 
+def test_what_two_designs_lack_is_said_once(tmp_path: Path) -> None:
+    designs = 'vary:\n  - saltelli: {varied}\n    count: 2\n  - morris: {other}\n    count: 3\n'
+    for word, path in (('{varied}', A), ('{other}', B)):
+        designs = designs.replace(word, f'{{{path}: {{uniform: {{from: 1.0, to: 2.0}}}}}}')
+    text = f'{SALTELLI.partition("vary")[0]}{designs}'
+
+    def settling(controller, values, index):
+        column = 'velocity_error.settling_time'
+        return {f'{column}.{dof}': np.where(index < 9, 3.0 - values[A], np.nan) for dof in DOFS}
+
+    notes = analysed(open_sweep(make_sweep(tmp_path, text, settling))).notes
+    assert len([note for note in notes if 'no indices of settled' in note]) == 1
+
+
 def test_an_unfinished_design_uses_its_whole_base_points(tmp_path: Path) -> None:
     out = make_sweep(tmp_path, SALTELLI, linear, range(5))  # 5 * 256 of 2 * 2048 rollouts
     found = [row for row in indices(out) if row['with'] is None]

@@ -77,6 +77,27 @@ def test_vehicles_that_alternate_keep_their_rows(files: Path) -> None:
     assert alone[0] != pytest.approx(alone[1], rel=0.01)
 
 
+def test_a_vehicle_that_other_values_make_valid_is_swept(files: Path) -> None:
+    thrusters = 'actuators: {thrusters: true}\n'
+    text = SCENARIO.replace('herman2018', 'bluerov2_heavy', 1) + thrusters
+    (files / 'scenario.yaml').write_text(text)
+    axes = {
+        'vehicle': ['bluerov2_heavy', 'rexrov', 'rexrov'],
+        'actuators.thrusters': [True, False, True],
+        'vehicle.rigid_body.center_of_gravity[2]': [0.02, 0.03, 0.03],
+    }
+    data = {'name': 'x', 'scenario': 'scenario.yaml', 'hold': 'zoh', 'controllers': ['cl']}
+    (files / 'campaign.yaml').write_text(yaml.safe_dump(data | {'vary': [{'zip': axes}]}))
+    run(files)
+    table = rows(files / 'out').to_pylist()
+    assert [row['status'] for row in table] == ['ok', 'ok', 'refused']
+    assert 'rexrov has none' in table[2]['reason']
+    values = {path: column[1] for path, column in axes.items()}
+    single = changed_scenario(load_scenario(files / 'scenario.yaml'), values)
+    expected = summarize(simulate(single, 'cl', 'zoh'))['effort']['rms'][0]
+    assert table[1]['effort.rms.surge'] == pytest.approx(expected)
+
+
 def test_a_worker_needs_no_file_of_the_set_point(files: Path) -> None:
     way = files / 'way.csv'
     way.write_text('t,surge,sway,heave,roll,pitch,yaw\n0,0,0,0,0,0,0\n1,0.5,0,0.2,0,0,0.1\n')

@@ -413,7 +413,8 @@ def _add(
         analysis.tables[name].append(row)
     for group in groups:
         analysis.tables['indices'] += indices(sweep, group, values, measure)
-        analysis.notes += omitted(sweep, group, values, measure)
+        lacking = omitted(sweep, group, values, measure)
+        analysis.notes += [note for note in lacking if note not in analysis.notes]
 
 
 def _influence(

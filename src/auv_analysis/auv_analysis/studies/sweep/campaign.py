@@ -1,6 +1,6 @@
 """Campaign file, format 1: which rollouts of which scenario, resolved and checked."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,17 +11,17 @@ from auv_analysis.runs.run import Hold
 from auv_analysis.scenario.changes import (
     VEHICLE,
     Parts,
-    changed_scenario,
     check_paths,
     split,
 )
-from auv_analysis.scenario.scenario import SAMPLED, Scenario, load_scenario
+from auv_analysis.scenario.scenario import SAMPLED, Scenario, load_scenario, vehicle_path_of
 from auv_analysis.simulation.simulate import check_hold
 from auv_analysis.studies.sweep.variation import Group, Values, kind_of, make_group
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant, one_of
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import check, dotted, read_yaml
+from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 from auv_gvc_controller.laws.law import SHIPPED
 
 SCHEMA = Path(__file__).with_name('campaign.schema.json')
@@ -54,8 +54,8 @@ class Campaign:
     path : of the campaign file
     data : its contents with every default filled in
     scenario : as it is in its file
-    scenarios : name of a vehicle -> the scenario with it; '' -> the scenario as it is, where the
-        vehicle does not vary
+    scenarios : name of a vehicle -> the scenario with it, which other values may have to make
+        valid; '' -> the scenario as it is, where the vehicle does not vary
     groups : what varies together, the last one fastest
 
     """
@@ -222,8 +222,16 @@ def _scenarios(scenario: Scenario, data: dict[str, Any], path: Path) -> dict[str
             if not names or not all(isinstance(name, str) for name in names):
                 expected = 'a list of names or paths of vehicles'
                 raise InputError(path, f'vary[{number}].{kind}.{VEHICLE}', expected, named)
-            return {name: changed_scenario(scenario, {VEHICLE: name}) for name in names}
+            return {name: _with_vehicle(scenario, name) for name in names}
     return {'': scenario}
+
+
+def _with_vehicle(scenario: Scenario, name: str) -> Scenario:
+    path = vehicle_path_of(name, scenario.path)
+    contents = read_yaml(path, 'vehicle')
+    vehicle = vehicle_from_dict(contents, path)
+    data = {**scenario.data, VEHICLE: name}
+    return replace(scenario, vehicle_path=path, vehicle=vehicle, vehicle_data=contents, data=data)
 
 
 def _check_varied(campaign: Campaign) -> None:

@@ -41,7 +41,7 @@ def contents_of(campaign: Campaign) -> str:
     scenario = campaign.scenario
     vehicles = {
         name: {'path': entry.vehicle_path.name, 'data': entry.vehicle_data}
-        for name, entry in campaign.scenarios.items()
+        for name, entry in ({'': scenario} | campaign.scenarios).items()
     }
     return json.dumps({
         'path': scenario.path.name,  # named in reasons, which shall not depend on the machine
@@ -113,7 +113,11 @@ def _figures(
     for vehicle in dict.fromkeys(vehicles.tolist()):
         mine = np.flatnonzero(vehicles == vehicle)
         values = {path: take(column, mine) for path, column in varied.items()}
-        scenario = scenario_of(contents, vehicle)
+        try:
+            scenario = scenario_of(contents, vehicle)
+        except InputError:  # valid in some rows, if any
+            scenario = scenario_of(contents, '')
+            values[VEHICLE] = [json.loads(contents)['vehicles'][vehicle]['data']] * len(mine)
         parts.append(rollouts(scenario, controller, values, seeds=seeds[mine], hold=hold))
         order.append(mine)
     if len(parts) == 1:

@@ -178,12 +178,11 @@ def omitted(sweep: Sweep, entry: Designed, values: np.ndarray, measure: Measure)
     """What has to be said of a measure that has no indices since some rows have no such figure."""
     for i, controller in enumerate(sweep.controllers):
         lacks = [np.isnan(values[_rows(sweep, entry, i, k)]) for k in range(len(entry.cases))]
-        some = [mask for mask in lacks if mask.any() and not mask.all()]
-        if some:
-            count, of = (int(sum(n)) for n in zip(*((m.sum(), m.size) for m in some), strict=True))
+        if any(mask.any() and not mask.all() for mask in lacks):
+            of_all = np.concatenate(lacks)
             yield (
-                f'no indices of {measure.label} under {controller}: {count} of {of} rows have '
-                'none, and the rest is no sample of the design'
+                f'no indices of {measure.label} under {controller}: {of_all.sum()} of '
+                f'{of_all.size} rows have none, and the rest is no sample of the design'
             )
 
 

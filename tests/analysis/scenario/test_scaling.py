@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from auv_analysis.scenario.scaling import (
     scenario_text,
     write_scaled_scenarios,
 )
+from auv_analysis.scenario.templates import scenario_files
 from auv_analysis.simulation.simulate import DivergedError
 from auv_dynamics import InputError, load_vehicle
 from auv_dynamics.files.shipped import shipped
@@ -96,6 +98,31 @@ def test_every_vehicle_meets_the_same_acceleration(name, scaled):
 def test_the_reference_keeps_its_own_disturbance():
     assert scaled_case1('herman2018')['disturbance']['scale'] == np.eye(6).tolist()
     assert scaled_case1('herman2018_neutral')['disturbance']['scale'] == np.eye(6).tolist()
+
+
+@pytest.mark.parametrize('smaller', [1.0, 5.0])
+def test_a_scenario_of_ones_own_has_gains_for_its_vehicle(smaller, tmp_path, monkeypatch):
+    """A BlueROV2 Heavy, and one a fifth as long, of 0.1 kg."""
+    data = yaml.safe_load(shipped('vehicles', 'bluerov2_heavy').read_text(encoding='utf-8'))
+    powers = np.array([3, 3, 3, 5, 5, 5])
+    data['added_mass'] = (np.array(data['added_mass']) * smaller**-powers).tolist()
+    data['rigid_body']['mass'] *= smaller**-3
+    data['rigid_body']['inertia'] = (np.array(data['rigid_body']['inertia']) * smaller**-5).tolist()
+    data['hydrostatics']['volume'] *= smaller**-3
+    for part in ('linear', 'quadratic'):
+        drag = np.array(data['damping'][part]) * smaller ** (1.0 - powers)
+        data['damping'][part] = drag.tolist()
+    monkeypatch.chdir(tmp_path)
+    Path('mine.yaml').write_text(yaml.safe_dump(data), encoding='utf-8')
+    Path('own.yaml').write_text(scenario_files('own', 'mine.yaml')['own.yaml'], encoding='utf-8')
+    scenario = changed_scenario(load_scenario('own.yaml'), {'duration': 2.0})
+    for name in scenario.controllers:
+        run = simulate(scenario, name, hold='zoh')
+        assert np.abs(run.nu_d - run.nu).max() < 2.0
+    K_D = scenario.gains('cl').k_D[::7]
+    reference = load_vehicle('herman2018').M
+    expected = 12.0 / np.diag(reference)
+    assert_allclose(K_D / np.diag(scenario.vehicle.M), expected, rtol=0.01)
 
 
 def test_a_vehicle_by_path(tmp_path, monkeypatch):

@@ -17,6 +17,11 @@ with M of this vehicle and M_ref of {REFERENCE}, and no coupling of the water: r
 much of each entry of F_39, surge to yaw, acts in degree of freedom i.
 """.splitlines()  # for a comment on the `scale` of a scaled disturbance
 SLOWER = 0.5  # of the set-point (35): 0.6 m/s in surge, 0.8 m/s in heave, 0.05 rad/s in yaw
+OF_MASS = {'gvc': ('k_I',), 'cl': ('k_D', 'k_I', 'Gamma')}  # gains of case1 in N and N m
+GAINS = f"""\
+Gains in N and N m are those of case1 times M_ii of this vehicle over that of {REFERENCE}, degree
+of freedom by degree of freedom, so that both loops are as fast.
+""".splitlines()  # for a comment
 DIGITS = 10  # of a written scale: the last ones differ between BLAS libraries
 ROUNDING = 1e-12  # relative to the largest entry, below which an entry of the scale is zero
 UNFIT = re.compile('[^A-Za-z0-9_.+-]+')  # in the name of a scenario, which names a folder
@@ -72,6 +77,16 @@ def scaled_case1(vehicle: str | Path) -> dict[str, Any]:
     scale = _rounded(loaded.M @ np.linalg.inv(load_vehicle(REFERENCE).M))
     scenario['disturbance'] = scenario['disturbance'] | {'scale': scale.tolist()}
     return scenario
+
+
+def scaled_gains(vehicle: str | Path) -> dict[str, dict[str, Any]]:
+    """Controllers of case1, with gains that give another vehicle a loop as fast as its own."""
+    controllers = read_yaml(shipped('scenarios', 'case1'), 'scenario')['controllers']
+    ratio = np.diag(load_vehicle(vehicle).M) / np.diag(load_vehicle(REFERENCE).M)
+    for entry in controllers.values():
+        for gain in OF_MASS[entry['law']]:
+            entry[gain] = [float(f'{entry[gain] * each:.3g}') for each in ratio]
+    return controllers
 
 
 def _slower(harmonics: dict[str, Any]) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.scenario.scaling import SCALE, scaled_case1
+from auv_analysis.scenario.scaling import GAINS, SCALE, scaled_case1, scaled_gains
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import read_text, read_yaml, yaml_text
@@ -187,9 +187,9 @@ def scenario_files(name: str, vehicle: str | None) -> dict[str, str]:
     """File name -> text of a scenario of one's own: case 1 scaled to a vehicle."""
     vehicle = vehicle or STARTING
     data = scaled_case1(vehicle) | {'name': name, 'vehicle': vehicle}
-    data['disturbance'] = [data['disturbance']]
+    data |= {'disturbance': [data['disturbance']], 'controllers': scaled_gains(vehicle)}
     first = "A scenario of your own: the paper's case 1, scaled to the vehicle; SI units."
-    about = (first, 'Of the disturbance:', *SCALE)
+    about = (first, *GAINS, 'Of the disturbance:', *SCALE)
     return {f'{name}.yaml': _text(data, SCHEMA, about)}
 
 

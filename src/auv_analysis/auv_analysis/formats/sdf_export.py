@@ -1,11 +1,12 @@
 """A vehicle as an SDF model for Gazebo: link, shape for buoyancy, hydrodynamics plugin."""
 
 from typing import Any
-from xml.sax.saxutils import escape, quoteattr
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from auv_analysis.formats.sdf_import import COLUMNS, FLUID, ROWS
+from auv_analysis.formats.xml_parts import ENTRIES
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.frames import swap_body_matrix, swap_inertia
 from auv_dynamics.vehicle.vehicle import Vehicle, skew
@@ -102,14 +103,13 @@ def _inertial(vehicle: Vehicle, added_mass: str) -> list[str]:
     assert vehicle.M_RB is not None
     mass, S = float(vehicle.M_RB[0, 0]), skew(vehicle.r_G)
     tensor = swap_inertia(vehicle.M_RB[3:, 3:] + mass * S @ S)
-    entries = [f'i{"xyz"[i]}{"xyz"[j]}' for i in range(3) for j in range(i, 3)]
     values = [tensor[i, j] for i in range(3) for j in range(i, 3)]
     lines = [
         '      <inertial>',
         f'        <pose>{_point(vehicle.r_G)} 0 0 0</pose>',
         f'        <mass>{_number(mass)}</mass>',
         '        <inertia>',
-        *(f'          {_tag(name, value)}' for name, value in zip(entries, values, strict=True)),
+        *(f'          {_tag(name, value)}' for name, value in zip(ENTRIES, values, strict=True)),
         '        </inertia>',
     ]
     if added_mass == IN_LINK and vehicle.M_A is not None:
@@ -155,7 +155,7 @@ def _plugin(vehicle: Vehicle, added_mass: str) -> list[str]:
 
 
 def _tag(name: str, value: float) -> str:
-    return f'<{name}>{escape(_number(value))}</{name}>'
+    return f'<{name}>{_number(value)}</{name}>'
 
 
 def _point(r: np.ndarray) -> str:

@@ -71,6 +71,6 @@ def paper_figure(run: RunInfo, kind: str) -> str | None:
 
 def paper_figures(run: RunInfo) -> list[str]:
     """Which figures of a run show what a figure of the paper shows, in words."""
-    found = {kind: paper_figure(run, kind) for kind in ('errors', 'lumped_error', 'inputs')}
-    found |= {kind: paper_figure(run, kind) for kind in ('delta_xi', 'delta_pi')}
+    kinds = ('errors', 'lumped_error', 'inputs', 'delta_xi', 'delta_pi')
+    found = {kind: paper_figure(run, kind) for kind in kinds}
     return [f'{kind} is the paper’s figure {number}' for kind, number in found.items() if number]

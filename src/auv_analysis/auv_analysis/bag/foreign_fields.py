@@ -15,6 +15,7 @@ import numpy as np
 
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant, one_of
+from auv_dynamics.files.yaml_files import is_number
 from auv_dynamics.ros.interface import LARGEST, NANOSECONDS, nanoseconds
 from auv_dynamics.vehicle.kinematics import quaternion
 
@@ -358,11 +359,6 @@ def _listed(message: Any, path: str) -> str:
     more = f' and {len(named) - SHOWN} more' if len(named) > SHOWN else ''
     likely = '' if inside else meant(path, every)
     return f': {", ".join(named[:SHOWN])}{more}{likely}' if every else ''
-
-
-def is_number(value: Any) -> bool:
-    """Whether it can stand in a row; no text, even of digits, and no truth value."""
-    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
 
 
 def numbers(message: Any, path: str = '') -> Iterator[tuple[str, float]]:

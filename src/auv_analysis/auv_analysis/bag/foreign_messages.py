@@ -14,7 +14,6 @@ from auv_analysis.bag.foreign_fields import (
     MessageReader,
     Reading,
     are_usable,
-    is_number,
     presets,
 )
 from auv_analysis.bag.foreign_topics import HELD, MappedTopic, TopicMap, other_odometries
@@ -22,6 +21,7 @@ from auv_analysis.bag.metadata import is_csv
 from auv_analysis.bag.reading import are_swapped, strays, stretches
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant
+from auv_dynamics.files.yaml_files import is_number
 from auv_dynamics.ros.interface import NANOSECONDS
 
 TOGETHER = 4096  # messages that wait as objects before they become rows of arrays

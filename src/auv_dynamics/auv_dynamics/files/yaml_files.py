@@ -267,12 +267,8 @@ def _as_input_error(
     # of an alternative (6 numbers or 6x6) only an entry that is no number at all is named itself
     for inner in sorted(error.context or [], key=lambda e: -len(e.absolute_path)):
         deeper = len(inner.absolute_path) > len(error.absolute_path)
-        number = isinstance(inner.instance, int | float) and not isinstance(inner.instance, bool)
-        if (
-            deeper
-            and inner.validator == 'type'
-            and not (number or isinstance(inner.instance, list))
-        ):
+        listed = isinstance(inner.instance, list)
+        if deeper and inner.validator == 'type' and not (listed or is_number(inner.instance)):
             error = inner
             break
     path = list(error.absolute_path)
@@ -305,8 +301,7 @@ def _title(error: 'jsonschema.ValidationError', root: dict[str, Any]) -> str:
 
 
 def _shape(value: list[Any]) -> str:
-    numbers = all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
-    if numbers:
+    if all(map(is_number, value)):
         return f'{len(value)} numbers {shorten(value)}'
     if all(isinstance(v, list) for v in value):
         lengths = sorted({len(v) for v in value})
@@ -329,13 +324,17 @@ def _leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[tuple[Any,
 
 def _check_finite(data: dict[str, Any], file: object) -> None:
     for path, value in _leaves(data):
-        number = isinstance(value, int | float) and not isinstance(value, bool)
         if isinstance(value, str) and any('\ud800' <= letter <= '\udfff' for letter in value):
             raise InputError(file, dotted(path), 'whole characters', value)
-        if number and not abs(value) <= LARGEST:
+        if is_number(value) and not abs(value) <= LARGEST:
             huge = f', at most {LARGEST:g}' if abs(value) < float('inf') else ''
             expected = f'a finite number{huge}'
             raise InputError(file, dotted(path), expected, value)
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a number: no text, even of digits, and no truth value."""
+    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
 
 
 def matrix6(value: Any) -> np.ndarray:

@@ -11,6 +11,7 @@ from rclpy.parameter import Parameter as RosParameter
 
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import one_of as nearest_of
+from auv_dynamics.files.yaml_files import is_number
 from auv_dynamics.ros.settings import Settings, read_settings
 
 KNOWN_TO_ALL = {'use_sim_time', 'start_type_description_service'}
@@ -110,14 +111,12 @@ def _taken(value: Any, kind: Any) -> Any:
     """A value that was given, as a list and with whole numbers as numbers where these are meant."""
     if isinstance(value, Sequence) and not isinstance(value, str | bytes):
         value = list(value)
-    whole = isinstance(value, int) and not isinstance(value, bool)
-    if kind is float and whole:
+    if kind is float and is_number(value):
         return float(value)
-    if kind == list[float] and (whole or isinstance(value, float)):
-        return [float(value)]
-    if kind == list[float] and isinstance(value, list):
-        numbers = all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
-        return [float(v) for v in value] if numbers else value
+    if kind == list[float]:
+        listed = [value] if is_number(value) else value
+        if isinstance(listed, list) and all(map(is_number, listed)):
+            return [float(number) for number in listed]
     return value
 
 

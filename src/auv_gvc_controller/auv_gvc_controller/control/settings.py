@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import is_number
 from auv_dynamics.ros.settings import Reader, name_of, read_settings, setting
 from auv_dynamics.vehicle.thrusters import SATURATIONS, SCALED, AttainableWrench, make_reach
 from auv_dynamics.vehicle.vehicle import Vehicle
@@ -228,9 +229,7 @@ def usual_acceleration(lockstep: bool) -> str:
 def _six_numbers(values: Sequence[Any], source: str, name: str) -> tuple[float, ...]:
     """Six numbers of one or six, zero for an axis without actuators; none of none."""
     listed = [*values] * (6 if len(values) == 1 else 1)
-    good = all(
-        isinstance(v, int | float) and not isinstance(v, bool) and 0 <= v < math.inf for v in listed
-    )
+    good = all(is_number(value) and 0 <= value < math.inf for value in listed)
     if len(listed) not in (0, 6) or not good or (listed and not any(listed)):
         raise InputError(source, name, '1 or 6 numbers of at least 0, one above it', [*values])
     return tuple(map(float, listed))

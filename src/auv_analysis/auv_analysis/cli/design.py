@@ -8,7 +8,6 @@ from typing import Any
 from auv_analysis.cli.arguments import SCENARIO, VEHICLE, add_results, refused
 
 BOUND = re.compile(r'([a-z.]+)=([^:=]+):([^:=]+)')
-LONGEST = 90  # of the vehicle's name in that of the folder
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -26,7 +25,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     """Which change of a vehicle removes which coupling."""
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import bar, count, say, waiting
-    from auv_analysis.scenario.scaling import UNFIT
+    from auv_analysis.scenario.scaling import plain_name
     from auv_analysis.simulation.simulate import announce
     from auv_analysis.studies.design.prediction import coupling_named, present
     from auv_analysis.studies.design.results import write_results
@@ -36,8 +35,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     setting = open_setting(options.vehicle, options.scenario, options.bound)
     if options.reduce is not None:
         coupling_named(options.reduce, present(setting.space.vehicle))
-    name = UNFIT.sub('_', setting.space.vehicle.name)[:LONGEST]
-    out = options.out or Path('runs') / f'design_{name}'
+    out = options.out or Path('runs') / plain_name('design', setting.space.vehicle.name)
     with results_folder(out, overwrite=options.overwrite, inputs=setting.inputs) as results:
         for warning in setting.scenario.warnings:
             say(f'warning: {warning}')

@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices: threads only wait
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import bar, waiting
-    from auv_analysis.scenario.scaling import UNFIT
+    from auv_analysis.scenario.scaling import plain_name
     from auv_analysis.studies.excite.drive import Request
     from auv_analysis.studies.excite.excite import excite
     from auv_analysis.studies.excite.report import (
@@ -91,7 +91,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         (*DEFAULT, *options.free), options.fixed, options.lag, options.velocity_noise,
         options.attitude_noise, options.spread, options.closed_loop, options.seed,
     )  # fmt: skip
-    out = options.out or Path('runs') / f'excite_{UNFIT.sub("_", vehicle.name)[:90]}'
+    out = options.out or Path('runs') / plain_name('excite', vehicle.name)
     with results_folder(out, overwrite=options.overwrite, inputs=[request.path]) as folder:
         with bar() as shown:
             task = shown.add_task('phases', total=1)

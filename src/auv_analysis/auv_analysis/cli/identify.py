@@ -146,7 +146,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 def read(options: argparse.Namespace, command: str) -> Trial:
     """Vehicle and recordings that a command is given."""
     from auv_analysis.output.progress import waiting
-    from auv_analysis.scenario.scaling import UNFIT
+    from auv_analysis.scenario.scaling import plain_name
     from auv_dynamics.files.shipped import shipped
     from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
@@ -157,7 +157,7 @@ def read(options: argparse.Namespace, command: str) -> Trial:
     others = [getattr(options, name, None) for name in ('map', 'prior', 'holdout')]
     inputs = [*options.bags, *(Path(one) for one in others if one and Path(one).exists())]
     inputs.append(shipped('vehicles', options.vehicle))
-    out = options.out or Path('runs') / f'{command}_{UNFIT.sub("_", vehicle.name)[:90]}'
+    out = options.out or Path('runs') / plain_name(command, vehicle.name)
     return Trial(vehicle, training, held, notes, inputs, out)
 
 

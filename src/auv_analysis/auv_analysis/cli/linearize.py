@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from auv_analysis.scenario.scenario import Scenario
     from auv_dynamics.vehicle.vehicle import Vehicle
 
-LONGEST = 90  # of the name in that of the folder
-
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """What is linearised, and about which point."""
@@ -40,7 +38,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     """Poles and matrices of a vehicle, or of a scenario's closed loops."""
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import say, waiting
-    from auv_analysis.scenario.scaling import UNFIT
+    from auv_analysis.scenario.scaling import plain_name
     from auv_analysis.scenario.scenario import Scenario
     from auv_analysis.studies.linearize.margins import ControlLoop, stability_margins
     from auv_analysis.studies.linearize.modes import (
@@ -81,8 +79,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
             margins = {name: stability_margins(loop) for name, loop in loops.items()}
     except ValueError as error:
         raise InputError(paths[0], *refusal(error)) from None
-    folder = f'linearize_{UNFIT.sub("_", subject.name)[:LONGEST]}'
-    out = options.out or Path('runs') / folder
+    out = options.out or Path('runs') / plain_name('linearize', subject.name)
     made = results_of(subject.name, models, margins, left_out)
     document = made.to_json()
     with results_folder(out, overwrite=options.overwrite, inputs=paths) as results:

@@ -25,7 +25,6 @@ of freedom by degree of freedom, so that both loops are as fast.
 DIGITS = 10  # of a written scale: the last ones differ between BLAS libraries
 ROUNDING = 1e-12  # relative to the largest entry, below which an entry of the scale is zero
 UNFIT = re.compile('[^A-Za-z0-9_.+-]+')  # in the name of a scenario, which names a folder
-LONGEST = 90
 
 TOP_SPEED = {
     'bluerov2': '1.5 m/s (Blue Robotics)',
@@ -68,7 +67,7 @@ def scaled_case1(vehicle: str | Path) -> dict[str, Any]:
     """
     scenario = read_yaml(shipped('scenarios', 'case1'), 'scenario')
     loaded = load_vehicle(vehicle)
-    scenario['name'] = f'case1_{UNFIT.sub("_", loaded.name)[:LONGEST]}'
+    scenario['name'] = plain_name('case1', loaded.name)
     bare = shipped('vehicles', vehicle) != Path(vehicle)
     scenario['vehicle'] = str(vehicle if bare else Path(vehicle).resolve())
     scenario['setpoint'] = {
@@ -87,6 +86,11 @@ def scaled_gains(vehicle: str | Path) -> dict[str, dict[str, Any]]:
         for gain in OF_MASS[entry['law']]:
             entry[gain] = [float(f'{entry[gain] * each:.3g}') for each in ratio]
     return controllers
+
+
+def plain_name(kind: str, name: str, longest: int = 90) -> str:
+    """A kind and so much of a name, as the name of a scenario or of a folder."""
+    return f'{kind}_{UNFIT.sub("_", name)[:longest]}'
 
 
 def _slower(harmonics: dict[str, Any]) -> dict[str, Any]:

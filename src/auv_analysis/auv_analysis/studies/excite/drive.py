@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.runs.run import Run
-from auv_analysis.scenario.scaling import UNFIT
+from auv_analysis.scenario.scaling import plain_name
 from auv_analysis.scenario.scenario import Scenario, resolved, scenario_from
 from auv_analysis.simulation.open_loop import open_loop
 from auv_analysis.simulation.simulate import DivergedError, simulate
@@ -244,7 +244,7 @@ def scenario_of(request: Request, wave: Harmonics) -> dict[str, Any]:
     bare = request.path != Path(request.given)
     data: dict[str, Any] = {
         'format': 1,
-        'name': f'excite_{UNFIT.sub("_", request.vehicle.name)[:LONGEST]}',
+        'name': plain_name('excite', request.vehicle.name, LONGEST),
         'vehicle': request.given if bare else str(request.path.resolve()),
         'duration': request.duration,
         'step': request.step,

@@ -101,7 +101,7 @@ def packages() -> Iterator[Finding]:
     asked = {name: text for package in OURS for name, text in _asked(package)}
     missing = [text for name, text in asked.items() if _version(name) is None]
     wrong = [f'{name} {_version(name)}, not {text}' for name, text in asked.items()
-             if name not in missing and not _fits(text)]  # fmt: skip
+             if not _fits(text)]  # fmt: skip
     modules = [MODULES.get(name, name.replace('-', '_')) for name in asked if _version(name)]
     failing = _failing([*modules, 'rclpy'])
     if missing:

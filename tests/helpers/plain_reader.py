@@ -183,6 +183,8 @@ def _role(topic: str) -> str:
 
 def _decoded(decoder: Any, data: bytes, path: Path, topic: str) -> Any:
     try:
+        if data[:2] not in (bytes(2), b'\0\1'):
+            raise ValueError(f'CDR of kind {data[:2].hex()}')
         return decoder(data)
     except Exception as error:
         raise _refusal(path, topic, 'messages of its type', error) from None

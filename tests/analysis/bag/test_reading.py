@@ -41,7 +41,7 @@ OPTIONS = st.fixed_dictionaries({
 })  # fmt: skip
 ODD = (  # what a message may be in place of a usable one of constant length
     'big endian', 'trailing bytes', 'other frame', 'longer frame', 'no frame', 'NaN', 'infinite',
-    'long quaternion', 'cut', 'late', 'negative', 'not text',
+    'long quaternion', 'cut', 'late', 'negative', 'not text', 'CDR 2',
 )  # fmt: skip
 SHARED = [HealthCheck.function_scoped_fixture]
 quick = examples(15, suppress_health_check=SHARED)
@@ -74,6 +74,8 @@ def message(role: str, k: int, odd: str = '') -> tuple[str, bytes]:
         struct.pack_into('<i', data, 4, {'negative': -5, 'late': -(2**31)}[odd])
     elif odd == 'not text':
         data[16] = 0xFF
+    elif odd == 'CDR 2':
+        data[1] = 7
     elif odd == 'trailing bytes':
         data += b'\0\0\0\7'
     elif odd == 'cut':

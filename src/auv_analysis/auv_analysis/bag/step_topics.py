@@ -48,6 +48,7 @@ READERS: dict[str, Callable[[Any, interface.Frames], tuple[int, tuple[float, ...
     role: partial(_BY_KIND[kind], topic=role) for role, kind in KINDS.items()
 }
 CDR = 4  # bytes of the encapsulation, from which alignment counts
+PLAIN = b'\0\1'  # kind of CDR, little endian; all zero: big endian
 STAMP = slice(CDR, CDR + 8)  # sec and nanosec
 LATEST = 1 << 31  # s: from here on it depends on the schema whether a stamp is negative
 NEARLY = 1e-3 - 1e-9  # of the norm of a quaternion: beyond, the reader of single messages decides
@@ -141,7 +142,10 @@ class Decoding:
     def message(self, table: MessageTable, i: int, channel: int) -> Any:
         """Message number i of a table."""
         try:
-            return self._decoders[channel](table.message(i))
+            data = table.message(i)
+            if data[:2] not in (b'\0\0', PLAIN):
+                raise ValueError(f'CDR of kind {data[:2].hex()}')
+            return self._decoders[channel](data)
         except Exception as error:  # by its schema, a message may be anything
             raise refusal(
                 self._path, self._topics[channel], 'messages of its type', error
@@ -261,7 +265,7 @@ def learned(message: bytes, role: str, decoder: Callable[[bytes], Any]) -> StepL
 
 def _layout(kind: str, message: bytes) -> StepLayout | None:
     """Layout by the definition of the type, not proven yet."""
-    if len(message) < CDR or message[1] & 1 == 0:
+    if len(message) < CDR or message[:2] != PLAIN:
         return None
     place, shared = STAMP.stop, [0, 1]
     for _ in range(2 if kind == ODOMETRY else 1):

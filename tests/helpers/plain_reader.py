@@ -77,7 +77,7 @@ def slow_read_bag(bag: str | Path) -> BagContents:
                         ) from None
                     if decoder is None:
                         found = f'messages in {record.message_encoding}'
-                        found += f', a definition in {schema.encoding}' if schema.encoding else ''
+                        found += f', a definition in {schema.encoding}'
                         expected = 'cdr, with a definition in ros2msg'
                         raise InputError(path, record.topic, expected, found)
                     decoders[record.id] = decoder

@@ -261,6 +261,19 @@ def test_a_controller_that_pairs_exactly_has_its_own_stamps(tmp_path: Path) -> N
     assert_array_equal(load_run(path).t, [0.0, 0.02, 0.06])
 
 
+@pytest.mark.parametrize(('told', 'kept'), [
+    ('lockstep: false, setpoint_timeout: 0.05', 6), ('lockstep: true, setpoint_timeout: 0.05', 10),
+    ('lockstep: false', 10), ('setpoint_timeout: lots', 10),
+])  # fmt: skip
+def test_a_set_point_holds_no_longer_than_the_controller_holds_it(tmp_path, told, kept) -> None:
+    stamps, last = range(1000, 1200, GRID), [1000, 1020, 1040, 1060]
+    params = f'/**/controller_node:\n  ros__parameters: {{setpoint_pairing: latest, {told}}}\n'
+    run = load_run(write(tmp_path, stamps, last, params=params, ahead=0))
+    assert run.samples == kept
+    text = 'cmd_vel: older than 0.05 s, the timeout of the controller, at 4 of 10 odometry messages'
+    assert any(text in note for note in run.notes) == (kept == 6)
+
+
 def test_of_an_unknown_recorder_set_points_with_stamps_of_their_own_are_held(
     tmp_path: Path,
 ) -> None:

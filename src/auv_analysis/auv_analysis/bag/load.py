@@ -10,6 +10,7 @@ import numpy as np
 from auv_analysis.bag import attachments
 from auv_analysis.bag.attachments import Parameters
 from auv_analysis.bag.mcap_file import DAMAGED
+from auv_analysis.bag.plant_run import PLANT, longest_part, time_zero
 from auv_analysis.bag.reading import (
     BagContents,
     Series,
@@ -25,7 +26,7 @@ from auv_analysis.bag.step_topics import KINDS, READERS, NotOursError, namespace
 from auv_analysis.metrics.certificate import SPARSE
 from auv_analysis.runs.run import Run, rows_of
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.plant.plant import initial_state, unwrapped_eta
+from auv_dynamics.plant.plant import unwrapped_eta
 from auv_dynamics.ros import interface
 from auv_dynamics.vehicle.frames import NED_FSD, named_axes
 from auv_dynamics.vehicle.vehicle import Vehicle
@@ -33,10 +34,6 @@ from auv_dynamics.vehicle.vehicle import Vehicle
 WHOLE = 1 << 16  # steps up to which a recording is kept in memory
 REQUIRED = (interface.ODOM, interface.WRENCH)
 Steps = tuple[np.ndarray, dict[str, np.ndarray]]  # stamps (n,) in ns, role -> values
-PLANT = 'plant_node'
-FEW = 3  # resets whose times are named
-BACK_AT, AWAY = 1e-12, 1e-6  # from where it started: a step from one to the other is a reset
-LOOSE = 1.0  # s that a recording in real time may lack at its end
 SETPOINTS = (interface.CMD_VEL, interface.CMD_ACCEL)
 LATEST = 'latest'
 PAIRED = 0.75  # share of odometry with a set-point of its stamp, from which each should have one
@@ -102,7 +99,11 @@ def open_bag(
     # where the bag does not say it: a controller beside a driver held its set-points
     free = contents.strict is False or (contents.strict is None and _have_own_stamps(series))
     if held := controller.get('setpoint_pairing', LATEST if free else None) == LATEST:
-        series = held_series(series, whole)
+        timeout = controller.get('setpoint_timeout')
+        if controller.get('lockstep') is True or not isinstance(timeout, int | float):
+            timeout = math.inf
+        series, aged = held_series(series, whole, timeout)
+        begun += aged
     ns, values = complete(series, whole)
     if len(ns) < 2:
         expected = 'at least two steps that are complete on all step topics'
@@ -112,8 +113,8 @@ def open_bag(
     dropped = [note for role, stamps in counted.items() for note in _dropped(role, stamps, len(ns))]
     known = attachments.vehicle_of(contents, bag, vehicle)
     plant = parameters.get(PLANT, {})
-    zero, missing = _time_zero(ns, plant)
-    kept, again = _longest_part(ns, values, plant, zero)
+    zero, missing = time_zero(ns, plant)
+    kept, again = longest_part(ns, values, plant, zero)
     values = {role: rows[kept] for role, rows in values.items()}
     facts = _facts(contents, bag, parameters, known, (ns[kept], zero), {*values})
     facts['notes'] += *begun, *missing, *again, *dropped
@@ -172,61 +173,6 @@ def _dropped(role: str, stamps: np.ndarray, kept: int) -> list[str]:
     if left := len(stamps) - doubled - kept:
         notes.append(f'{role}: {left} of {len(stamps)} messages are not complete on all topics')
     return notes
-
-
-def _time_zero(ns: np.ndarray, plant: Mapping[str, Any]) -> tuple[int, list[str]]:
-    """Stamp, ns, from which the time of a run counts, and notes on what of it is missing.
-
-    That of the first of steps (n,), but that our plant in lock-step begins with zero, whatever is
-    missing in the bag.
-
-    Parameters
-    ----------
-    ns : (n,) rising stamps
-    plant : parameters of the plant node, empty beside a driver
-
-    """
-    step, planned = (plant.get(key, math.nan) for key in ('step', 'duration'))
-    told, end = isinstance(step, int | float), float(ns[-1]) / interface.NANOSECONDS
-    # of a run without an end, or stamps that are no plant's, nothing is known
-    if not (told and isinstance(planned, int | float) and end <= planned + step / 2):
-        return int(ns[0]), []
-    lockstep = plant.get('lockstep') is True
-    notes = [f'begins at {ns[0] / interface.NANOSECONDS:.6g} s'] * bool(lockstep and ns[0] > 0)
-    if planned - end > (step / 2 if lockstep else LOOSE):
-        notes.append(f'ends at {end:.6g} s of the {planned:g} s that were planned')
-    return 0 if lockstep else int(ns[0]), notes
-
-
-def _longest_part(
-    ns: np.ndarray, values: Mapping[str, np.ndarray], plant: Mapping[str, Any], zero: int
-) -> tuple[slice, list[str]]:
-    """The longest part of a run that no reset of the plant interrupts, and a note on the others.
-
-    Parameters
-    ----------
-    ns, values : (n,) stamps, role -> rows
-    plant : parameters of the plant node, empty beside a driver
-    zero : stamp from which time counts, ns
-
-    """
-    try:
-        initial = [plant.get(f'initial.{key}', [0.0] * 6) for key in ('eta', 'nu')]
-        start = initial_state(*np.array(initial, float).reshape(2, 6))
-    except (TypeError, ValueError):
-        return slice(None), []
-    x = values.get(interface.GROUND_TRUTH, values[interface.ODOM])
-    away = [np.abs(rows_of(x, here) - start).max(axis=1) for here in slices(len(x))]
-    far = np.concatenate(away)
-    resets = np.flatnonzero((far[1:] < BACK_AT) & (far[:-1] > AWAY)) + 1
-    if not (plant and len(resets)):
-        return slice(None), []
-    edges = [0, *resets.tolist(), len(ns)]
-    kept = int(np.argmax(np.diff(edges)))
-    times = ', '.join(f'{(ns[k] - zero) / interface.NANOSECONDS:.6g}' for k in resets[:FEW])
-    more = f' and {len(resets) - FEW} times more' * (len(resets) > FEW)
-    note = f'the plant was reset at {times} s{more}; read the longest of {len(edges) - 1} parts'
-    return slice(*edges[kept : kept + 2]), [note]
 
 
 def _facts(
@@ -483,11 +429,15 @@ def _picked(rows: np.ndarray, index: np.ndarray, whole: float) -> np.ndarray:
     return gathered((rows_of(rows, index[here]) for here in slices(len(index))), whole)
 
 
-def held_series(series: Mapping[str, Series], whole: float = math.inf) -> dict[str, Series]:
+def held_series(
+    series: Mapping[str, Series], whole: float = math.inf, timeout: float = math.inf
+) -> tuple[dict[str, Series], list[str]]:
     """The series, role -> stamps and rows, with set-points at the stamps of the odometry.
 
-    A set-point holds until the next one: each odometry has the newest at or before its stamp.
+    A set-point holds until the next one, or the timeout, s: each odometry has the newest at or
+    before its stamp. Notes say where it was too old.
     """
+    notes = list[str]()
     stamps = np.sort(series[interface.ODOM][0])
     held = dict(series)
     for role in SETPOINTS:
@@ -496,5 +446,10 @@ def held_series(series: Mapping[str, Series], whole: float = math.inf) -> dict[s
             order = np.argsort(ns, kind='stable')
             index = np.searchsorted(ns, stamps, 'right', sorter=order) - 1
             known = index >= 0
+            age = (stamps - ns[order[index]]) / interface.NANOSECONDS
+            if role == interface.CMD_VEL and (count := np.count_nonzero(known & (age > timeout))):
+                text = f'{role}: older than {timeout:g} s, the timeout of the controller, at '
+                notes.append(f'{text}{count} of {len(stamps)} odometry messages, left out')
+                known &= age <= timeout
             held[role] = stamps[known], _picked(rows, order[index[known]], whole)
-    return held
+    return held, notes

@@ -100,7 +100,7 @@ class Decoding:
         decoder = self._decoder(channel, schema)
         if decoder is None:
             found = f'messages in {channel.message_encoding}'
-            found += f', a definition in {schema.encoding}' * bool(schema and schema.encoding)
+            found += f', a definition in {schema.encoding}' if schema else ''
             raise InputError(self._path, channel.topic, 'cdr, with a definition in ros2msg', found)
         self._decoders[channel.id] = decoder
         self._topics[channel.id] = channel.topic

@@ -355,6 +355,22 @@ def test_silence_of_set_points_counts_by_the_clock_on_the_wall_as_well():
     assert bench.odometry(5, at=0.53).trouble == ''
 
 
+def test_silence_of_set_points_does_not_wait_for_an_odometry():
+    """A measurement every 0.4 s, of which one is lost: nearly a second."""
+    bench = Bench(setpoint=0.5, odometry=2.0, ramp=0.2)
+    for ms in range(0, 400, 10):
+        bench.setpoint(ms)
+        assert bench.odometry(ms).trouble == ''
+    said = [bench.watch(ms / 1000) for ms in range(400, 1200, 20)]
+    assert [answer is not None for answer in said] == [
+        880 < ms < 1120 for ms in range(400, 1200, 20)
+    ]
+    wrenches = [answer.tau[0] for answer in said if answer]
+    assert sorted(wrenches, key=abs, reverse=True) == wrenches
+    assert wrenches[0] != wrenches[-1] == 0.0
+    assert bench.controller.watchdog == 'no set-point heard for 0.5 s'
+
+
 def test_a_publisher_that_falls_silent_is_missed_however_far_ahead_it_was():
     bench = Bench(setpoint=0.5)
     for ms in range(0, 2000, 10):

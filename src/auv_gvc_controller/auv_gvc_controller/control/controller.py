@@ -206,7 +206,6 @@ class VelocityController:
             return None
         ns, x, dt = self._waiting
         silent = self._silent(now)
-        self._setpoints.left |= silent
         reference = self._setpoints.find(ns)
         if reference is None:
             return None if self._exact else self._trip(ns, 'no set-point yet', now)
@@ -240,13 +239,20 @@ class VelocityController:
             return self._trip(self._waiting[0], 'no set-point of its stamp', now)
         silence = now.steady - self._heard
         if silence <= late.odometry:
-            return None
+            return self._watch_setpoints(now)
         if self._in_charge and silence > 2 * late.odometry:  # it was stopped itself, and not heard
             self._output.drop()  # a vehicle has let go since: the old wrench would be a new one
         answer = self._trip(self._guard.last or 0, f'no odometry for {late.odometry:g} s', now)
         if self._output.idle:
             self._heard = None  # said
         return answer
+
+    def _watch_setpoints(self, now: Now) -> Answer | None:
+        """Let go between two odometries, however rare they are, until the wrench is zero."""
+        silent = '' if self._exact or self._output.idle else self._silent(now)
+        if silent and (self._in_charge or self.watchdog == silent):
+            return self._trip(self._guard.last or 0, silent, now)
+        return None
 
     @property
     def newest(self) -> int | None:
@@ -263,19 +269,20 @@ class VelocityController:
         self._waiting, self._heard, self._bridge = None, None, True
         return Answer(self._guard.last or 0, self._output.drop(), ZERO)
 
-    def _silent(self, now: Now) -> bool:
-        """Whether set-points have not been heard for too long, however far ahead they were."""
+    def _silent(self, now: Now) -> str:
+        """That set-points have not been heard for too long, however far ahead they were."""
         late = self._timeouts
-        return late is not None and now.steady - self._setpoints.heard > late.setpoint
+        if late is None or now.steady - self._setpoints.heard <= late.setpoint:
+            return ''
+        self._setpoints.left = True
+        return f'no set-point heard for {late.setpoint:g} s'
 
-    def _stale(self, ns: int, reference: Reference, silent: bool) -> str:
+    def _stale(self, ns: int, reference: Reference, silent: str) -> str:
         """Why a set-point is not followed any more, or an empty text."""
         if self._timeouts is None:
             return ''
-        most, age = self._timeouts.setpoint, (ns - reference.ns) / 1e9
-        if age > most:
-            return f'no set-point for {age:.3g} s'
-        return f'no set-point heard for {most:g} s' if silent else ''
+        age = (ns - reference.ns) / 1e9
+        return f'no set-point for {age:.3g} s' if age > self._timeouts.setpoint else silent
 
     def _trip(self, ns: int, trouble: str, now: Now) -> Answer:
         """Let go because of a watchdog: in real time the integrals do not outlive it."""

@@ -148,14 +148,14 @@ def _sensitivities(
     options: argparse.Namespace, scenario: Scenario, names: Mapping[str, Any]
 ) -> dict[str, Sensitivity]:
     from auv_analysis.output.progress import say, waiting
-    from auv_analysis.studies.study.sensitivity import sensitivity
+    from auv_analysis.studies.study.sensitivity import SPAN, sensitivity
 
     found = {}
     for name in names:
         with waiting(f'{scenario.name} {name}: varying the gains'):
             found[name] = sensitivity(
                 scenario, name, method=options.sensitivity, count=options.samples,
-                span=options.span or 2.0, seed=options.seed or 0, hold=options.hold,
+                span=options.span or SPAN, seed=options.seed or 0, hold=options.hold,
                 threads=_threads(),
             )  # fmt: skip
         if found[name].refusal:

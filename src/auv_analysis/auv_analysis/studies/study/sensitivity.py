@@ -119,6 +119,7 @@ def _largest_of_kind(kpi: Kpi, found: Mapping[str, np.ndarray]) -> float:
     return max(float(np.nanmax(found[f'{kpi.name}.{dof}'], initial=0.0)) for dof in alike)
 
 
+SPAN = 2.0  # from 1/SPAN to SPAN times the value of a gain
 COUNTS = {'sobol': 256, 'morris': 32}  # default base points, trajectories
 OWN_COUNTS = {'sobol': 64, 'morris': 16}  # of a user's law, whose every loop is packed on its own
 SLOW_COUNT = 4  # trajectories of a law that runs as plain Python
@@ -269,7 +270,7 @@ def sensitivity(
     *,
     method: Method | None = None,
     count: int | None = None,
-    span: float = 2.0,
+    span: float = SPAN,
     seed: int = 0,
     hold: Hold = 'continuous',
     threads: int = 1,

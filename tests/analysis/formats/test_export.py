@@ -1,6 +1,7 @@
 """A vehicle through Gazebo's format and back, and what Gazebo would make of it."""
 
 import json
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -43,6 +44,20 @@ def test_lift_that_feeds_its_own_motion_comes_back(place, tmp_path, monkeypatch,
     main(['import-vehicle', 'there.sdf', '--out', 'back.yaml', '--json'])
     assert 'feeds its own motion' in str(json.loads(capsys.readouterr().out)['warnings'])
     assert_allclose(load_vehicle(tmp_path / 'back.yaml').lift, data['lift'])
+
+
+def test_quadratic_damping_that_feeds_its_motion_comes_back(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    text = shipped('vehicles', 'bluerov2_heavy').read_text()
+    Path('mine.yaml').write_text(text.replace('0.47, 1.5]', '0.47, -0.3]'))
+    main(['export-vehicle', 'mine.yaml', '--format', 'gazebo', '--out', 'm.sdf'])
+    with pytest.raises(SystemExit):
+        main(['import-vehicle', 'm.sdf', '--out', 'again.yaml'])
+    assert 'or --sign sname if this one feeds its motion' in capsys.readouterr().err
+    main(['import-vehicle', 'm.sdf', '--sign', 'sname', '--out', 'again.yaml'])
+    known = load_vehicle('mine.yaml').D_quadratic
+    assert known[5, 5] < 0
+    assert_allclose(load_vehicle('again.yaml').D_quadratic, known)
 
 
 def test_damping_acts_in_gazebo_as_here(tmp_path, capsys):

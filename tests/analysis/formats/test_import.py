@@ -11,6 +11,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis.cli.main import main
 from auv_dynamics import load_vehicle
+from auv_dynamics.vehicle.frames import swap_inertia
+from auv_dynamics.vehicle.vehicle import skew
 
 LIST = ['--inertia-reference', 'co', '--gravity', '9.81']
 DIGITS = 1e-8  # of the volume that the shipped file rounds
@@ -429,9 +431,15 @@ def test_a_model_of_classic_gazebo_has_its_body_in_sdf(imported):
     moved = URDF.replace('xyz="0 0 0"', 'xyz="0.1 0.2 0.3"')
     assert_same(vehicle, imported('a.urdf', moved)[0])
     assert document['vehicle']['name'] == 'made'
-    turned = text.replace('0.1 0.2 0.3 0 0 0', '0.1 0.2 0.3 0 0 1')
-    with pytest.raises(SystemExit):
-        imported('model.sdf', f'<sdf version="1.6">{turned}</sdf>')
+    turned = text.replace('0.1 0.2 0.3 0 0 0', f'0.1 0.2 0.3 0 0 {np.pi / 2}')
+    found, document = imported('turned.sdf', f'<sdf version="1.6">{turned}</sdf>')
+    given = np.array([[525.39, 1.44, 33.41], [1.44, 794.20, 2.6], [33.41, 2.6, 691.23]])
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    S = skew(found.r_G)
+    about_cg = found.M_RB[3:, 3:] + found.M_RB[0, 0] * S @ S
+    assert_allclose(about_cg, swap_inertia(quarter @ given @ quarter.T), atol=1e-9)
+    assert_allclose(found.r_G, vehicle.r_G)
+    assert any('the tensor is turned' in text for text in document['traps'])
 
 
 def test_bodies_that_a_urdf_fixes_to_that_of_the_vehicle_are_reported(imported):

@@ -50,8 +50,9 @@ def read_vehicle(path: Path, format_: str, choices: Choices) -> tuple[str, Impor
         return found, read_gazebo(parse_xml(text, path), path, choices)
     if not is_xml:
         return found, read_uuv(parse_yaml(text, path, 'uuv_simulator'), path, choices, path.stem)
-    entries, others = uuv_entries(parse_xml(text, path), path)
+    entries, others, done = uuv_entries(parse_xml(text, path), path)
     draft = read_uuv(entries, path, choices, path.stem)
+    draft.traps += done
     other_links(draft, others)
     return found, draft
 

@@ -112,19 +112,23 @@ class ImportedVehicle:
 
         The user's choice of sign takes the place of the format's; a diagonal entry that then acts
         the wrong way is refused, as signs are then not what they were taken for. Lift may feed
-        its own motion where damping, put before, has shown what the sign is.
+        its own motion where damping, put before, has shown what the sign is; some of the quadratic
+        damping where the user has said what it is.
         """
         used = self.choices.sign or convention
         turned = -A if used == SNAME else A.copy()
         wrong = np.flatnonzero(np.diagonal(turned) < 0)
         damping = [np.diagonal(A) for name, A in self.values.items() if name.startswith('damping.')]
-        if len(wrong) and not (key == 'lift' and np.any(damping)):
+        some = key == 'damping.quadratic' and bool(np.any(np.diagonal(turned) > 0))
+        told = some and self.choices.sign is not None
+        if len(wrong) and not told and not (key == 'lift' and np.any(damping)):
             i = int(wrong[0])
             other = POSITIVE if used == SNAME else SNAME
             sign = 'negative, as derivatives are' if used == SNAME else 'positive'
+            feeds = f', or --sign {used} if this one feeds its motion' * some
             raise self.refuse(
                 key,
-                f'{sign}, or --sign {other} if all are of the other sign',
+                f'{sign}, or --sign {other} if all are of the other sign{feeds}',
                 f'{A[i, i]:g} in {name}',
             )
         if not np.any(A):

@@ -15,6 +15,8 @@ from auv_analysis.formats.imported import (
 )
 from auv_analysis.formats.xml_parts import (
     ENTRIES,
+    TURNED,
+    inertia_entries,
     mass_of,
     numbers,
     pose_in_link,
@@ -154,8 +156,8 @@ def _matrices(draft: ImportedVehicle, given: Mapping[str, Any]) -> None:
     )
 
 
-def uuv_entries(root: Element, path: Path) -> tuple[dict[str, Any], list[Element]]:
-    """Entries of the one link with <hydrodynamic_model> and its body, and the other bodies.
+def uuv_entries(root: Element, path: Path) -> tuple[dict[str, Any], list[Element], list[str]]:
+    """Entries of the one link with <hydrodynamic_model> and its body, other bodies, what was done.
 
     Parameters
     ----------
@@ -185,22 +187,23 @@ def uuv_entries(root: Element, path: Path) -> tuple[dict[str, Any], list[Element
         expected = f'<inertial> of the link {name}, with xacro expanded'
         raise InputError(path, 'inertial', expected, None)
     others = [link for link in bodies if link is not named[0]]
-    return entries | _inertial(named[0], model, path), others
+    body, done = _inertial(named[0], model, path)
+    return entries | body, others, done
 
 
-def _inertial(link: Element, model: Element, path: Path) -> dict[str, Any]:
+def _inertial(link: Element, model: Element, path: Path) -> tuple[dict[str, Any], list[str]]:
     found = link.find('inertial')
     assert found is not None
     origin, inertia = found.find('origin'), found.find('inertia')
     if origin is not None and any(numbers(origin.get('rpy', '0 0 0'), 3, path, 'inertial.origin')):
         raise InputError(path, 'inertial.origin', 'rpy="0 0 0"', origin.get('rpy'))
     point, R = pose_in_link(found, link, model, path, 'inertial')  # of SDF
-    if np.any(np.eye(3) != R):
-        expected = '<pose> without rotation'
-        raise InputError(path, 'inertial.pose', expected, found.findtext('pose'))
-    entries = {} if inertia is None else {str(part.tag): part.text or '' for part in inertia}
-    return {
+    parts = {} if inertia is None else {str(part.tag): part.text or '' for part in inertia}
+    texts = parts if inertia is None else parts | dict(inertia.attrib)
+    tensor = dict(zip(ENTRIES, inertia_entries(texts, R, path, 'inertial'), strict=True))
+    body = {
         'mass': mass_of(found),
         'center_of_gravity': point.tolist() if origin is None else origin.get('xyz', '0 0 0'),
-        'inertial': entries if inertia is None else entries | dict(inertia.attrib),
+        'inertial': tensor,
     }
+    return body, [TURNED] * bool(np.any(np.eye(3) != R))

@@ -1,6 +1,7 @@
 """XML that nobody has to trust, and what SDF and URDF share: bodies, poses, collision shapes."""
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError
 
@@ -159,7 +160,17 @@ def _volume(geometry: Element, path: Path, key: str) -> float | None:
     return None
 
 
+TURNED = 'link.inertial.pose: the tensor is turned into the axes of the link'
 ENTRIES = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
+
+
+def inertia_entries(texts: Mapping[str, str], R: np.ndarray, path: object, key: str) -> list[float]:
+    """Entries ixx ... izz of a tensor in the axes of its link, which R turns it into."""
+    given = [numbers(texts.get(name, '0'), 1, path, f'{key}.{name}')[0] for name in ENTRIES]
+    xx, xy, xz, yy, yz, zz = given
+    turned = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
+    upper = [float(turned[i, j]) for i in range(3) for j in range(i, 3)]
+    return upper if np.any(np.eye(3) != R) else given
 
 
 def put_rigid_body(
@@ -208,13 +219,8 @@ def link_inertia(draft: ImportedVehicle, link: Element, model: Element) -> None:
         raise draft.refuse(f'{key}.auto', expected, inertial.get('auto'))
     mass = numbers(inertial.findtext('mass'), 1, path, f'{key}.mass')[0]
     r_G, R = pose_in_link(inertial, link, model, path, key)
-    entries = [
-        numbers(inertial.findtext(f'inertia/{name}', '0'), 1, path, f'{key}.{name}')[0]
-        for name in ENTRIES
-    ]
+    texts = {name: inertial.findtext(f'inertia/{name}', '0') for name in ENTRIES}
+    entries = inertia_entries(texts, R, path, key)
     if np.any(np.eye(3) != R):
-        draft.traps.append('link.inertial.pose: the tensor is turned into the axes of the link')
-        xx, xy, xz, yy, yz, zz = entries
-        turned = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
-        entries = [float(turned[i, j]) for i in range(3) for j in range(i, 3)]
+        draft.traps.append(TURNED)
     put_rigid_body(draft, mass, r_G, entries, '<inertial> of the link')

@@ -9,6 +9,7 @@ from auv_analysis.cli.main import main
 from auv_analysis.metrics.authority import beyond_authority
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.shipped import shipped
+from auv_dynamics.vehicle.thrusters import Thrusters
 
 
 def test_the_largest_wrench_is_that_of_the_best_thrusts() -> None:
@@ -49,6 +50,22 @@ def test_what_is_remarkable_of_the_largest_commands(largest, words) -> None:
     found = beyond_authority(vehicle, largest)
     assert len(found) == len(words)
     assert all(word in text for word, text in zip(words, found, strict=True))
+
+
+@pytest.mark.parametrize(
+    ('least', 'most', 'text'),
+    [(-4.0, 24.0, []), (-9.0, 24.0, ['-9.00 of at most -5.00 N in surge']),
+     (-30.0, 24.0, ['30.0 of at most 25.0 N in surge']),
+     (np.nan, np.nan, [])],
+)  # fmt: skip
+def test_a_propeller_weaker_astern_is_judged_astern(least, most, text) -> None:
+    limits = np.array([5.0]), np.array([25.0])
+    thrusters = Thrusters(('P',), np.eye(6)[:, :1], *limits)
+    vehicle = load_vehicle('rexrov').changed(thrusters=thrusters)
+    ways = [value * np.eye(6)[0] for value in (least, most)]
+    largest = [np.nan_to_num(max(abs(least), abs(most))), 0, 0, 0, 0, 0]
+    found = beyond_authority(vehicle, largest, ways)
+    assert [line.partition('give: ')[2].replace('\N{MINUS SIGN}', '-') for line in found] == text
 
 
 def test_without_thrusters_only_the_weight_is_known() -> None:

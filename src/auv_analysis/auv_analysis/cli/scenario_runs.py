@@ -301,7 +301,8 @@ def conclude(
         say(sentence)
     console.print(summary_tables(summaries))
     for name, run in runs.items():
-        for remark in beyond_authority(run.vehicle, summaries[name]['effort']['max']):
+        ways = run.tau.min(axis=0), run.tau.max(axis=0)
+        for remark in beyond_authority(run.vehicle, summaries[name]['effort']['max'], ways):
             say(f'note: {name}: {remark}')
     return summaries
 

@@ -13,20 +13,23 @@ NOTHING = 1e-6  # of the largest command of its kind: rounding
 UNITS = ('N', 'N', 'N', 'N m', 'N m', 'N m')
 
 
-def beyond_authority(vehicle: Vehicle, largest: Sequence[float]) -> list[str]:
+def beyond_authority(
+    vehicle: Vehicle, largest: Sequence[float], ways: Sequence[np.ndarray] | None = None
+) -> list[str]:
     """What is remarkable of the largest commands of a run, a phrase each; none where all is well.
 
     Parameters
     ----------
     vehicle : whose weight and thrusters are known, the latter where its file gives them
     largest : (6,) magnitudes of the command, N and N m; None: not recorded
+    ways : its least and its largest values, (6,) each, NaN: not recorded; None: not known
 
     """
     largest = [0.0 if value is None else value for value in largest]
     found = list(_above_weight(float(vehicle.weight), largest))
     if vehicle.thrusters is not None:
         found += _without_actuators(vehicle.thrusters, largest)
-        found += _above_thrust(vehicle.thrusters, largest)
+        found += _above_thrust(vehicle.thrusters, largest, ways)
     return found
 
 
@@ -53,12 +56,18 @@ def _without_actuators(thrusters: Thrusters, largest: Sequence[float]) -> Iterat
         )
 
 
-def _above_thrust(thrusters: Thrusters, largest: Sequence[float]) -> Iterator[str]:
-    lost, most = thrusters.unactuated(), thrusters.largest()
-    asked = [
-        f'{number(largest[i])} of at most {number(most[i])} {UNITS[i]} in {dof}'
-        for i, dof in enumerate(DOFS)
-        if dof not in lost and largest[i] > most[i]
-    ]
+def _above_thrust(
+    thrusters: Thrusters, largest: Sequence[float], ways: Sequence[np.ndarray] | None
+) -> Iterator[str]:
+    lost, (astern, ahead) = thrusters.unactuated(), thrusters.both_ways()
+    asked = []
+    for i, dof in enumerate(DOFS):
+        either = (largest[i], max(ahead[i], astern[i]))
+        each = [] if ways is None else [(ways[0][i], -astern[i]), (ways[1][i], ahead[i])]
+        above = [pair for pair in (either, *each) if abs(pair[0]) > abs(pair[1])]
+        above = [(tau, most) for tau, most in above if tau * most >= 0.0]
+        if dof not in lost and above:
+            tau, most = above[0]
+            asked.append(f'{number(tau)} of at most {number(most)} {UNITS[i]} in {dof}')
     if asked:
         yield f'more is commanded than the thrusters can give: {join(asked)}'

@@ -299,11 +299,10 @@ def findings(runs: Mapping[str, RunDigest], summaries: Summaries) -> list[Senten
             _reached('The largest commands are', commands, WRENCH, 3),
         )
         found += [Sentence(text, metrics) for text in texts]
-    found += [
-        Sentence(f'Under {name} {"; ".join(remarks)}.', metrics)
-        for name, run in runs.items()
-        if (remarks := beyond_authority(run.vehicle, summaries[name]['effort']['max']))
-    ]
+    for name, run in runs.items():
+        tau, most = run.part('tau'), summaries[name]['effort']['max']
+        if remarks := beyond_authority(run.vehicle, most, (tau.low, tau.high)):
+            found.append(Sentence(f'Under {name} {"; ".join(remarks)}.', metrics))
     found += [Sentence(_applied(runs), 'inputs_compared')]
     found += [
         Sentence(estimate_finding(n, s), f'table-{ESTIMATES[s["unexplained"] is None]}')

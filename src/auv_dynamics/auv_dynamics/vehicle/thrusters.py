@@ -112,9 +112,13 @@ class Thrusters:
 
     def largest(self) -> np.ndarray:
         """(6,) largest wrench along each axis, N and N m, whichever way it is larger."""
+        return self.both_ways().max(axis=0)
+
+    def both_ways(self) -> np.ndarray:
+        """(2, 6) largest wrench along each axis, N and N m: astern, ahead."""
         ahead = np.where(self.matrix > 0, self.matrix * self.forward, -self.matrix * self.reverse)
         astern = np.where(self.matrix > 0, self.matrix * self.reverse, -self.matrix * self.forward)
-        return np.maximum(ahead.sum(axis=1), astern.sum(axis=1))
+        return np.array([astern.sum(axis=1), ahead.sum(axis=1)])
 
     def alone(self) -> np.ndarray:
         """(2, 6) largest wrench of each axis without the others, N and N m: astern, ahead."""

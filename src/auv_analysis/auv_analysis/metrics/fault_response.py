@@ -158,8 +158,7 @@ class _Recovery:
 
 def write_responses(folder: Path, found: Mapping[str, Sequence[FaultResponse]]) -> Path:
     """Write `faults.parquet`, a row per fault, controller and degree of freedom."""
-    rows = fault_rows(found)
-    return write_table(folder / FILE, {key: [row[key] for row in rows] for key in rows[0]})
+    return write_table(folder / FILE, fault_rows(found))
 
 
 def fault_rows(found: Mapping[str, Sequence[FaultResponse]]) -> list[dict[str, Any]]:

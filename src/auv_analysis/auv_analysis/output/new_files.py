@@ -114,10 +114,11 @@ def known(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def write_table(path: Path, columns: Mapping[str, Sequence[Any]]) -> Path:
-    """Write columns of words, whole numbers or numbers as Parquet; None and NaN become null."""
+def write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
+    """Write rows of words, whole numbers or numbers as Parquet; None and NaN become null."""
     from pyarrow import parquet
 
+    columns = {name: [row[name] for row in rows] for name in rows[0]}
     parquet.write_table(arrow_table(columns), path)
     return path
 

@@ -68,8 +68,7 @@ def write_sensitivities(folder: Path, found: Sequence[Sensitivity]) -> Path:
     no indices.
 
     """
-    rows = [row for of in found for row in _stored(of)]
-    return write_table(folder / FILE, {name: [row[name] for row in rows] for name in rows[0]})
+    return write_table(folder / FILE, [row for of in found for row in _stored(of)])
 
 
 def _stored(of: Sensitivity) -> Iterator[Row]:

@@ -18,7 +18,7 @@ from auv_analysis.metrics.energy import depends_on_known, shares
 from auv_analysis.metrics.lyapunov import lyapunov
 from auv_analysis.metrics.moments import Moments, Tally
 from auv_analysis.output.new_files import known
-from auv_analysis.runs.run import Run, RunInfo
+from auv_analysis.runs.run import Run
 from auv_gvc_controller.control.gains import body_gains
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model
@@ -113,7 +113,10 @@ def summarize(
         'acceleration': run.acceleration,
         'unexplained': estimate_figures(run.unexplained, run.unexplained_error),
         'required_wrench': estimate_figures(run.required_wrench, run.required_wrench_error),
-        'gaps': gap_figures(run),
+        'gaps': {
+            'valid_share': run.valid_share,
+            'spans': [{'window': list(span)} for span in run.gaps],
+        },
         'notes': list(run.notes),
     }
     return known(figures)
@@ -241,12 +244,6 @@ def _energy(inside: Moments, window: tuple[float, float], known: np.ndarray) -> 
 
 def _peak(part: Moments, signal: int) -> list[float] | None:
     return part.peak(signal) if part.count else None
-
-
-def gap_figures(run: RunInfo) -> dict[str, Any]:
-    """Share of the run's length that has samples, and where there are none."""
-    spans = [{'window': list(span)} for span in run.gaps]
-    return {'valid_share': run.valid_share, 'spans': spans}
 
 
 def estimate_figures(

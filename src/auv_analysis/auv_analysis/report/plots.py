@@ -271,7 +271,7 @@ def before_after(
         tick.set_fontweight('bold' if name == bold else 'normal')
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.margins(x=0.06)
-    axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=2)
+    legend_above(axes, 2)
 
 
 def moving(part: Part, skip: Sequence[str] = ()) -> list[int]:
@@ -315,14 +315,13 @@ def shade_sentence(run: RunDigest) -> str:
 def key(axes: Axes, quantity: Quantity, columns: Sequence[int]) -> None:
     """Name the lines above the panel, at its right."""
     handles = [Line2D([], [], color=COLOURS[i]) for i in columns]
-    place: dict[str, Any] = {
-        'loc': 'lower right',
-        'bbox_to_anchor': (1.0, 1.02),
-        'ncols': len(columns),
-    }
-    axes.legend(
-        handles, [f'{mathtext(quantity.components[i])} {DOFS[i]}' for i in columns], **place
-    )
+    names = [f'{mathtext(quantity.components[i])} {DOFS[i]}' for i in columns]
+    legend_above(axes, len(columns), handles, names)
+
+
+def legend_above(axes: Axes, columns: int, *named: Any, **look: Any) -> None:
+    """Legend above the panel, at its right; `named`: handles and labels, if not all lines."""
+    axes.legend(*named, loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=columns, **look)
 
 
 def logarithmic(axes: Axes, *directions: str) -> None:

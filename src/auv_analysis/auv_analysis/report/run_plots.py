@@ -330,7 +330,7 @@ def energy(runs: Mapping[str, RunDigest], leading: RunDigest) -> Drawn:
     for look, run in zip(_looks(runs), runs.values(), strict=True):
         handles += left.plot(*run.drawn('kinetic'), **look)
     names, columns = fitting([*wanted, *runs], 3, HALF)
-    left.legend(handles, names, loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=columns)
+    plots.legend_above(left, columns, handles, names)
     left.set_ylim(bottom=0.0)
     left.set_ylabel('kinetic energy (J)')
     _stack(right, leading)
@@ -377,7 +377,7 @@ def energy_shares(runs: Mapping[str, RunDigest]) -> Drawn:
     axes.tick_params(axis='y', length=0)
     axes.set_xlabel('share of the mean kinetic energy (%)')
     names, columns = fitting([*runs], 4)
-    axes.legend(handles, names, loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=columns)
+    plots.legend_above(axes, columns, handles, names)
     title = 'Shares of kinetic energy'
     caption = (
         f'{title}: mean of the samples of 0 to {end:g} s (filled) and of the whole run '
@@ -392,9 +392,7 @@ def _stack(axes: Axes, run: RunDigest) -> None:
     axes.stackplot(t, part.T, colors=COLOURS, linewidth=0)
     shown = [i for i in range(6) if part[:, i].max(initial=0.0) > 1.0]
     patches = [Line2D([], [], color=COLOURS[i], linewidth=6) for i in shown]
-    axes.legend(
-        patches, [XI[i] for i in shown], loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=6
-    )
+    plots.legend_above(axes, 6, patches, [XI[i] for i in shown])
     axes.set_ylim(0.0, 100.0)
     axes.set_ylabel('share (%)')
     axes.grid(False)

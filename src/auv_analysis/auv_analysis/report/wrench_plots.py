@@ -226,14 +226,8 @@ def _increasing(axes: Axes, run: RunDigest, part: str) -> None:
 
 def _rates_key(axes: Axes) -> None:
     handles = [Line2D([], [], **look) for look in reversed(RATES.values())]
-    axes.legend(
-        handles,
-        ['measured', 'identity (26)', 'bound (28)'],
-        loc='lower right',
-        bbox_to_anchor=(1.0, 1.02),
-        ncols=3,
-        handlelength=2.4,
-    )
+    names = ['measured', 'identity (26)', 'bound (28)']
+    plots.legend_above(axes, 3, handles, names, handlelength=2.4)
 
 
 BAND = 0.3  # opacity

@@ -84,7 +84,7 @@ def _reduced(document: Mapping[str, Any], lines: Mapping[str, RunDigest]) -> Dra
             axes.set_xlim(t[0], t[-1])
         axes.set_xlabel('$t$ (s)')
     grid[0].set_ylabel(f'${SYMBOLS[kind]}_{column + 1}$ ({unit})')
-    grid[-1].legend(loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=2)
+    plotting.legend_above(grid[-1], 2)
 
     caption = f'{document["reduce"]} of the vehicle before and after the change, under {main}.'
     if split:

@@ -100,17 +100,15 @@ class Reproduction(NamedTuple):
 
     def sentence(self) -> str:
         """What is said first of the results."""
-        limit = f'(limit {100.0 * self.limit:g} %)'
         if self.missing:
             return f'NOT reproduced: {self.missing} recorded wrenches are not answered again'
         if self.within is None:
             return f'{UNCHECKED}: no recorded wrench answers a recorded odometry, but on a ramp'
+        verdict = 'reproduced' if self.holds else 'NOT reproduced'
         if self.relative is None:
-            return f'{"" if self.holds else "NOT "}reproduced: the recorded wrench is zero'
-        text = f'by {100.0 * self.relative:.3g} % rms {limit}'
-        if self.holds:
-            return f'reproduced: the recorded law differs from the recorded wrench {text}'
-        return f'NOT reproduced: the recorded law differs from the recorded wrench {text}'
+            return f'{verdict}: the recorded wrench is zero'
+        by = f'by {100.0 * self.relative:.3g} % rms (limit {100.0 * self.limit:g} %)'
+        return f'{verdict}: the recorded law differs from the recorded wrench {by}'
 
 
 def reproduction(recorded: RecordedLoop, again: OpenLoop) -> Reproduction:
@@ -202,7 +200,7 @@ def draw(document: Mapping[str, Any], both: Compared, folder: Path) -> Path:
 
 def _figure(document: Mapping[str, Any], both: Compared) -> tuple[Figure, str, str]:
     from auv_analysis.metrics.quantities import SIGNALS
-    from auv_analysis.report.plots import COLOURS, DASHES
+    from auv_analysis.report.plots import COLOURS, DASHES, legend_above
     from auv_analysis.report.traces import FEW, thinned
     from auv_analysis.report.wrench_plots import six_panels
 
@@ -217,7 +215,7 @@ def _figure(document: Mapping[str, Any], both: Compared) -> tuple[Figure, str, s
                 t, tau = thinned(t, tau)
             axes.plot(t, tau, color=COLOURS[k], linestyle=dash, label=name)
         axes.set_ylabel(f'{DOFS[i]}: {SIGNALS["tau"].axis([i])}')
-    panels[3].legend(loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=2)
+    legend_above(panels[3], 2)
     said = capital(verdict)
     figure.suptitle(said, fontsize='small')
     title = f'What {names[1]} would have commanded'

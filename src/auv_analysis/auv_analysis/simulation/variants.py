@@ -35,7 +35,7 @@ from auv_gvc_controller.laws.model import control_model
 
 Keys = tuple[str | int, ...]  # place of a value in a file, such as ('damping', 'linear', 0)
 RELATIVE = ('mass', 'added_mass', 'damping', 'buoyancy')  # errors of a plant
-NUMERIC = (
+NUMERIC = (  # of M, D and g
     'rigid_body', 'inertia_matrix', 'hydrostatics', 'added_mass', 'damping', 'lift', 'environment',
 )  # fmt: skip
 TERM = ('amplitude', 'omega', 'phase')
@@ -60,7 +60,7 @@ def in_columns(scenario: Scenario, controller: str, path: str, values: np.ndarra
     if head == 'controllers':
         return rest[0] == controller and _gain_fits(scenario, controller, rest[1:], values)
     if head == 'vehicle':
-        return _vehicle_fits(scenario, rest, values)
+        return rest[0] in NUMERIC and _fits(scenario.vehicle_data, rest, values, SHAPES)
     if head == 'disturbance':
         return values.ndim == 1 and _error_fits(scenario, rest)
     if head == 'setpoint':
@@ -98,11 +98,6 @@ def _gain_fits(scenario: Scenario, controller: str, keys: Keys, values: np.ndarr
     entry = scenario.data['controllers'][controller]
     gain = entry['law'] in SHIPPED and keys != ('anti_windup',)
     return gain and _fits(entry, keys, values, (*SHAPES, ()))
-
-
-def _vehicle_fits(scenario: Scenario, keys: Keys, values: np.ndarray) -> bool:
-    """Numbers of M, D and g."""
-    return keys[0] in NUMERIC and _fits(scenario.vehicle_data, keys, values, SHAPES)
 
 
 def _fits(data: Any, keys: Keys, values: np.ndarray, shapes: Sequence[tuple[int, ...]]) -> bool:

@@ -84,6 +84,13 @@ def test_a_run_that_begins_later_has_later_windows(made):
     assert windows_of(begun, replace(later, faults=(begun,)))[:2] == ((100, 100), (100, 114))
 
 
+def test_of_a_fault_that_was_over_before_the_first_sample_nothing_is_known(made):
+    late = made.part(made.t > 16.995)
+    assert windows_of(LOST, late) == ((17.0, 17.0), (17.0, 17.0), (14.0, 15.0))
+    of_lost = [one for one in responses(late) if one.mark == LOST]
+    assert {(one.rms, one.recovery) for one in of_lost} == {((None, None, None), None)}
+
+
 def test_errors_recovery_and_effort(made):
     found = {(one.mark.number, one.dof): one for one in responses(made)}
     sway = found[1, 'sway']

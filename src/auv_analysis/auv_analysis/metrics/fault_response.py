@@ -67,7 +67,8 @@ def windows_of(mark: Mark, run: RunInfo) -> tuple[Window, Window, Window]:
     begun = [other.start for other in run.faults if other.start < start]
     ended = [other.end for other in run.faults if other.end <= start]
     before = max([first, start - length, *begun, *ended])
-    return (before, start), (start, end), (end, min(end + length, next_change(mark, run)))
+    after = end, min(end + length, next_change(mark, run))
+    return (before, start), (start, max(start, end)), after
 
 
 def next_change(mark: Mark, run: RunInfo) -> float:
@@ -149,7 +150,8 @@ class _Recovery:
 
     def time(self, i: int) -> float | None:
         """Seconds until one of them has settled; None: it has not."""
-        if not self._seen or not has_settled(self._left[i], self._seen):
+        unseen = self._mark.end < self._run.start
+        if unseen or not self._seen or not has_settled(self._left[i], self._seen):
             return None
         if self._left[i] < 0:
             return 0.0

@@ -43,17 +43,19 @@ def rows(count: int, width: int) -> np.ndarray:
 
 def write(
     path: Path, *, late: int = 0, accel: bool = True, lost: tuple = (), params: dict | None = None,
-    namespace: str = '', first: int = 0,
+    namespace: str = '', first: int = 0, told: bool = True,
 ) -> Path:  # fmt: skip
     """Bag of a controller's messages; set-points are logged `late` steps behind their stamps.
 
-    `first`: number of its first step by its stamps.
+    `first`: number of its first step by its stamps; `told`: whether it has parameters.
     """
     bag = Bag(path)
     bag.attach('vehicle.yaml', shipped('vehicles', VEHICLE).read_text())
     own = {**SETTINGS, **{f'gains.{k}': [v] for k, v in GAINS.items()}}
     nodes = {'controller_node': {**own, **(params or {})}}
-    bag.attach('params.yaml', yaml.safe_dump({n: {'ros__parameters': v} for n, v in nodes.items()}))
+    text = yaml.safe_dump({n: {'ros__parameters': v} for n, v in nodes.items()})
+    if told:
+        bag.attach('params.yaml', text)
     x, nu_d, slope = rows(COUNT, 13), rows(COUNT, 6), rows(COUNT, 6)
     for k in range(COUNT):
         ns = (first + k) * STEP
@@ -227,6 +229,12 @@ def test_in_lock_step_only_rounding_is_a_reproduction(tmp_path: Path) -> None:
         for size, holds in ((0.0, True), (5e-10, True), (2e-9, False)):
             wrong = replace(found, tau=(1.0 + size) * scale * found.tau)
             assert reproduction(same, wrong).holds == holds, size
+
+
+def test_settings_that_the_bag_does_not_tell_are_said(tmp_path: Path) -> None:
+    untold = recorded_loop(write(tmp_path / 'untold.mcap', told=False))
+    assert untold.notes == (opening.UNTOLD,)
+    assert recorded_loop(write(tmp_path / 'told.mcap')).notes == ()
 
 
 def test_behind_a_hole_of_lock_step_nothing_is_reproduced(tmp_path: Path) -> None:

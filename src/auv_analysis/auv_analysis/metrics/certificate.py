@@ -257,7 +257,8 @@ def why_unknown(run: Run) -> str:
     """Why z of a law is not known: it had integrated before the first sample, or began anew."""
     if run.law_state is not None:
         return ''
-    f = (block.disturbance_estimate for block in run.blocks())
+    parts = (slice(i, i + BLOCK) for i in range(0, len(run.t), BLOCK))
+    f = (rows_of(run.disturbance_estimate, part) for part in parts)
     adapted = np.concatenate([(np.abs(rows) > 0.0).any(axis=1) for rows in f])
     if run.start > 0.0 or adapted[0]:
         return 'the law had begun before the first sample: z is not known'

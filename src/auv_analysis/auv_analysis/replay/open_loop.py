@@ -34,6 +34,8 @@ from auv_gvc_controller.control.settings import ControllerSettings, usual_accele
 from auv_gvc_controller.laws.law import law_class, make_gains, refusal, try_law
 from auv_gvc_controller.laws.model import control_model
 
+UNTOLD = 'the bag does not tell the settings of the controller: usual ones are taken'
+
 
 class RecordedController:
     """Everything of a controller but its law; its clock is that of the stamps.
@@ -195,11 +197,12 @@ def recorded_loop(
     parameters = attachments.parameters_of(contents, bag)
     known, own = attachments.vehicle_of(contents, bag, vehicle), parameters.get(CONTROLLER, {})
     controller = RecordedController(own, known, bag, derivatives=interface.CMD_ACCEL in series)
-    begun: list[str] = []
+    begun = [UNTOLD] * ('params.yaml' not in contents.attachments)
     if controller.settings.lockstep:  # whose clock never begins anew: only chunks may be swapped
         series = in_order(series)
     elif not contents.strict:
-        series, begun = longest_stretch(series, math.inf)
+        series, anew = longest_stretch(series, math.inf)
+        begun += anew
     return RecordedLoop(
         series,
         controller,

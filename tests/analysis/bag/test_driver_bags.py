@@ -274,6 +274,14 @@ def test_a_set_point_holds_no_longer_than_the_controller_holds_it(tmp_path, told
     assert any(text in note for note in run.notes) == (kept == 6)
 
 
+def test_set_points_that_were_always_too_old_are_none(tmp_path: Path) -> None:
+    told = 'setpoint_pairing: latest, setpoint_timeout: 0.05'
+    params = f'/**/controller_node:\n  ros__parameters: {{{told}}}\n'
+    run = load_run(write(tmp_path, range(1000, 1200, GRID), [0], params=params, ahead=0))
+    assert (run.samples, run.knows_setpoint) == (10, False)
+    assert any('at 10 of 10 odometry messages' in note for note in run.notes)
+
+
 def test_of_an_unknown_recorder_set_points_with_stamps_of_their_own_are_held(
     tmp_path: Path,
 ) -> None:

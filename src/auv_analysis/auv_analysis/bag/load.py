@@ -451,5 +451,8 @@ def held_series(
                 text = f'{role}: older than {timeout:g} s, the timeout of the controller, at '
                 notes.append(f'{text}{count} of {len(stamps)} odometry messages, left out')
                 known &= age <= timeout
+                if not known.any():  # such as stamps of zero, which the controller refused
+                    del held[role]
+                    continue
             held[role] = stamps[known], _picked(rows, order[index[known]], whole)
     return held, notes

@@ -449,7 +449,7 @@ def held_series(
             age = (stamps - ns[order[index]]) / interface.NANOSECONDS
             if role == interface.CMD_VEL and (count := np.count_nonzero(known & (age > timeout))):
                 text = f'{role}: older than {timeout:g} s, the timeout of the controller, at '
-                notes.append(f'{text}{count} of {len(stamps)} odometry messages, left out')
+                notes.append(f'{text}{count} of {len(stamps)} odometry messages: not held there')
                 known &= age <= timeout
                 if not known.any():  # such as stamps of zero, which the controller refused
                     del held[role]

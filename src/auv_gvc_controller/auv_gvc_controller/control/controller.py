@@ -274,7 +274,7 @@ class VelocityController:
         late = self._timeouts
         if late is None or now.steady - self._setpoints.heard <= late.setpoint:
             return ''
-        self._setpoints.left = True
+        self._setpoints.leave()
         return f'no set-point heard for {late.setpoint:g} s'
 
     def _stale(self, ns: int, reference: Reference, silent: str) -> str:

@@ -1,5 +1,6 @@
 """Set-points on their way to a law: which one belongs to an odometry, and the reference filter."""
 
+import math
 from collections import OrderedDict
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -120,9 +121,7 @@ class SetpointBuffer:
 
     Attributes
     ----------
-    heard : when the newest set-point came, s of the steady clock
-    left : whether who sent them has fallen silent: the next one may be of somebody else, who did
-        not send what still lies ahead
+    heard : when the newest set-point came, s of the steady clock; before the first: minus infinity
 
     """
 
@@ -139,7 +138,7 @@ class SetpointBuffer:
         self._nu_d_dot: OrderedDict[int, tuple[float, ...]] = OrderedDict()
         self._used: Reference | None = None
         self._slope_until = 0  # ns
-        self.heard, self.left = 0.0, False
+        self.heard, self._left = -math.inf, False
 
     def believe(self, limits: Limits, steepest: tuple[float, ...] | None) -> None:
         """Set the limits of what comes from now on."""
@@ -152,12 +151,14 @@ class SetpointBuffer:
     def forget(self) -> None:
         """Forget everything, as when the stamps begin anew."""
         self.reset()
-        self._empty()
-
-    def _empty(self) -> None:
         self._nu_d.clear()
         self._nu_d_dot.clear()
-        self.left = False
+
+    def leave(self) -> None:
+        """Note that whoever sent them is silent: the next one may be of another."""
+        if not self._left and self.heard > -math.inf:
+            self._left = True
+            self._nu_d_dot.clear()  # now: those of the other may come before his nu_d
 
     def setpoint(self, ns: int, nu_d: tuple[float, ...], steady: float = 0.0) -> None:
         """Keep a set-point that came at `steady` s.
@@ -168,8 +169,9 @@ class SetpointBuffer:
 
         """
         self._limits.check_velocity(nu_d)
-        if self.left:
-            self._empty()
+        if self._left:
+            self._nu_d.clear()
+            self._left = False
         self._keep(self._nu_d, ns, nu_d)
         self.heard = steady
 

@@ -912,6 +912,7 @@ def test_steps_and_messages_that_did_not_arrive_are_said_at_the_end(
             give(node, '/diagnostics', DiagnosticArray(), **seen)  # of several that count
         made.drop(node)
     said = capfd.readouterr().err
+    assert 'steps of 0.01 s without a message, or' in said, 'a driver may have another period'
     assert "'odom': 2, 'wrench': 2, 'analysis/lumped_error': 1, 'twist': 3}" in said
 
 
@@ -982,7 +983,7 @@ def test_who_has_left_before_the_end_is_not_waited_for_without_end(
     tmp_path: Path, timers, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture
 ) -> None:
     """A plant that is killed, with nobody beside it who would notice."""
-    monkeypatch.setattr(recorder_node, 'GONE', -1.0)
+    monkeypatch.setattr(recorder_node, 'GONE', 0.0)
     with program() as made:
         node = recorder_in(made, tmp_path / 'bag', strict=False, duration=0.2)
         timers[0]()
@@ -999,3 +1000,28 @@ def test_who_has_left_before_the_end_is_not_waited_for_without_end(
         made.drop(node)
     assert 'came to step 14 of 20: nobody publishes odom any more' in capfd.readouterr().err
     assert read_bag(tmp_path / 'bag', decode=False).counts['/odom'] == 15
+
+
+def test_a_topic_that_stays_away_does_not_make_a_recording_endless(
+    tmp_path: Path, timers, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture
+) -> None:
+    """A controller has died; a vehicle goes on saying where it is."""
+    with program() as made:
+        node = recorder_in(made, tmp_path / 'bag', strict=False, duration=0.2)
+        give_steps(node, *range(15))
+        made.spin(0.3)
+        monkeypatch.setattr(recorder_node, 'GONE', 0.0)
+        monkeypatch.setattr(recorder_node, 'PATIENCE', math.inf)
+        made.node.create_publisher(topics.ODOM.type, 'odom', 10)
+        made.node.create_publisher(topics.WRENCH.type, 'wrench', 10)
+        made.until(lambda: made.node.count_publishers('wrench'), 'their names')
+        for k in range(15, 21):
+            timers[0]()
+            assert node.exit_code is None
+            give(node, 'odom', convert.odometry(k * STEP, UPRIGHT, FRAMES))
+        timers[0]()
+        assert node.exit_code is None, 'a wrench may be under way'
+        timers[0]()
+        assert node.exit_code == 1
+        made.drop(node)
+    assert 'came to step 20 without wrench' in capfd.readouterr().err

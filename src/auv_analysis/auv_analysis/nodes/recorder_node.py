@@ -130,7 +130,7 @@ class PublicationLedger:
 
 
 PATIENCE = 2.0  # s without any step, after which what lacks at the end does not come any more
-GONE = 10.0  # s without any step, after which who left is not waited for beyond the run's time
+GONE = 10.0  # s beyond the time of a run, or without any step, after which it is given up
 NUMBERED = {*topics.STEP_TOPICS, *topics.ANALYSIS_TOPICS, topics.CLOCK}  # with one publisher each
 TIMED = {*topics.STEP_TOPICS, topics.CLOCK}  # whose stamp is the log time, and the publish time
 
@@ -155,7 +155,7 @@ class RecorderNode(BulkNode):
         awaited = (topics.CLOCK, *topics.ANALYSIS_TOPICS)
         self._newest = {topic.name: -1 for topic in awaited}  # stamps, ns
         self._heard = 0.0  # steady s of the last step
-        self._began = 0.0  # of the first one
+        self._began = self._reached = 0.0  # of the first, and of the end if the run is over by then
         self._reported = -1
         self._complaints: set[str] = set()
         self.graph = NodeInterface(self, barrier=False, lockstep=p.strict)
@@ -254,9 +254,8 @@ class RecorderNode(BulkNode):
             self._say_progress()
         if self._last is not None and self._is_whole(self._last):
             self._end()
-        elif self._last is not None and (gone := self._gone(self._last)):
-            names = f'nobody publishes {", ".join(gone)} any more'
-            self._end(f'came to step {self._ledger.complete} of {self._last}: {names}')
+        elif self._last is not None and (lacking := self._given_up(self._last)):
+            self._end(lacking)
 
     def _is_whole(self, last: int) -> bool:
         """Whether all has come to the last step, or what need not come has stayed away.
@@ -272,13 +271,23 @@ class RecorderNode(BulkNode):
             return late and not self._settings.strict and reached
         return late or not 0 <= newest[topics.CLOCK.name] < self._ledger.complete_ns
 
-    def _gone(self, last: int) -> list[str]:
-        """Topics whose publishers have gone before the last step, once its time has passed."""
+    def _given_up(self, last: int) -> str:
+        """Why what lacks is not waited for any more, once the time of the run has passed."""
         now = time.monotonic()
-        over = now - self._began > last * self._settings.step and now - self._heard > GONE
-        short = self._ledger.short_of(last) if over and self._began else ()
+        over = now - self._began - last * self._settings.step
+        if not self._began or over <= 0.0:
+            return ''
+        short = self._ledger.short_of(last)
+        reached = self._ledger.reaches(last, self._newest[topics.CLOCK.name])
+        self._reached = (self._reached or now) if reached else 0.0
+        if reached and now - self._reached > GONE and not self._settings.strict:
+            return f'came to step {last} without {", ".join(short) or "its analysis"}'
         names = {topic: self.resolve_topic_name(topic) for topic in short}
-        return [topic for topic, name in names.items() if not self.count_publishers(name)]
+        gone = [topic for topic, name in names.items() if not self.count_publishers(name)]
+        if not gone or now - self._heard <= GONE:
+            return ''
+        who = f'nobody publishes {", ".join(gone)} any more'
+        return f'came to step {self._ledger.complete} of {last}: {who}'
 
     def _say_progress(self) -> None:
         if self._reported >= 0:
@@ -319,7 +328,8 @@ class RecorderNode(BulkNode):
         lost = {topic: gaps for topic, gaps in self._ledger.gaps.items() if gaps}
         if lost or self._publications.gaps:
             lost.update(self._publications.gaps)
-            self.get_logger().warning(f'steps or messages that did not arrive: {lost}')
+            steps = f'steps of {self._settings.step:g} s without a message'
+            self.get_logger().warning(f'{steps}, or messages that did not arrive: {lost}')
         if not self._complaints:
             self._name_silent()
         left = [f'{topic} ({why})' for topic, why in sorted(self._others.left.items())]

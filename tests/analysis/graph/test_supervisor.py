@@ -51,6 +51,23 @@ def test_who_only_observes_gives_way(tmp_path: Path, monkeypatch) -> None:
     assert given == [7]
 
 
+def test_a_node_that_begins_while_ctrl_c_comes_is_ended_as_well(tmp_path: Path) -> None:
+    """It wrote into its log once the files of the results were listed: --overwrite refused them."""
+
+    def begin(*given: object, **more: object) -> psutil.Popen:
+        process = psutil.Popen(*given, **more)
+        signal.raise_signal(signal.SIGINT)
+        return process
+
+    group = supervisor.Supervisor(tmp_path, os.environ, begin)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            group.start('node', ['sleep', '600'])
+    finally:
+        codes = group.stop()
+    assert codes == {'node': -signal.SIGTERM}
+
+
 @pytest.mark.parametrize(
     ('writes', 'takes', 'code'), [('recorder', 0.5, 7), ('', 600, -signal.SIGKILL)]
 )

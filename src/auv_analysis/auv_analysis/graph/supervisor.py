@@ -79,15 +79,16 @@ class Supervisor:
         self._logs.mkdir(parents=True, exist_ok=True)
         log = (self._logs / f'{name}.log').open('w+b')
         self._outputs[name] = log
-        # a session of its own: Ctrl-C reaches `auv`, which ends the nodes in order
-        self._processes[name] = self._begin(
-            command,
-            env=self._environment,
-            stdin=-3,  # subprocess.DEVNULL
-            stdout=log,
-            stderr=log,
-            start_new_session=True,
-        )
+        # a session of its own: Ctrl-C reaches `auv`, which ends the nodes that it knows in order
+        with undisturbed():
+            self._processes[name] = self._begin(
+                command,
+                env=self._environment,
+                stdin=-3,  # subprocess.DEVNULL
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
+            )
         if observes:
             give_way(self._processes[name].pid)
 

@@ -160,6 +160,14 @@ def test_an_unfinished_sweep_says_so(tmp_path: Path, monkeypatch, capsys) -> Non
     assert 'The sweep is not finished: 600 of 1600 rows are there.' in report
 
 
+@pytest.mark.usefixtures('undrawn')
+def test_a_sweep_in_which_nothing_differs_has_a_report(tmp_path: Path, monkeypatch) -> None:
+    """Such as of gains of one controller, all of whose rows failed."""
+    monkeypatch.chdir(tmp_path)
+    cli.main(['analyze', str(make_sweep(tmp_path, SIMPLE, lambda *_: {}))])
+    assert (tmp_path / 'runs/analyze_simple/report.html').is_file()
+
+
 def test_a_sweep_without_figures_is_a_failure(tmp_path: Path, capsys) -> None:
     def refused(controller, values, index):
         return {'status': np.full(len(index), 'refused', object)}

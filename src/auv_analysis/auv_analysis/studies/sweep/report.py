@@ -194,7 +194,8 @@ def write_report(out: Path, analysis: Analysis, figures: Mapping[str, FigureReco
     sections = [
         Section('campaign', 'What was swept', [_paths(analysis), _counts(analysis),
                                                *analysis.notes]),
-        Section('distributions', 'Distributions', [*shown('distributions'), _spreads(analysis)]),
+        Section('distributions', 'Distributions', [
+            *shown('distributions'), *([_spreads(analysis)] if analysis.measures else [])]),
         Section('controllers', 'Controllers against each other',
                 [_view('paired', 'Controllers against each other in the same rollouts.',
                        enumerate(tables['paired']), PAIRED, stub=3)] if tables['paired'] else []),

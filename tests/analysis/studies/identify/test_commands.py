@@ -201,7 +201,7 @@ def test_a_recording_that_contradicts_the_prior_gives_no_file(bag, tmp_path, mon
 
 
 def test_the_wrench_that_acted_takes_the_place_of_the_command_and_the_truth_that_of_nothing(
-    tmp_path, monkeypatch
+    tmp_path, monkeypatch, capsys
 ):
     notes = []
     monkeypatch.setattr(bags, 'contradictions', lambda *_: ['odd'])
@@ -216,6 +216,8 @@ def test_the_wrench_that_acted_takes_the_place_of_the_command_and_the_truth_that
         read_records(bag, vehicle, None, applied=applied, notes=notes) for applied in (False, True)
     )
     assert notes.count('odd') == 2
+    (note,) = (text for text in notes if 'much less acted than was commanded' in text)
+    assert capsys.readouterr().err == f'warning: {bag}: {note}\n'
     np.testing.assert_allclose(acted.command, 0.5 * asked.command, atol=1e-9)
     assert np.abs(asked.command).max() > 1.0
     np.testing.assert_allclose(acted.velocity, run.nu, atol=1e-9)

@@ -1,6 +1,6 @@
 """Records of bags: of ours without a word, of others with a mapping."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -14,12 +14,18 @@ from auv_analysis.bag.foreign_messages import read_sources
 from auv_analysis.bag.foreign_topics import TopicMap, read_mapping
 from auv_analysis.bag.foreign_tracks import tracks_of, unknown_angles
 from auv_analysis.bag.tracks import Track
+from auv_analysis.output.progress import say
+from auv_analysis.output.text import join
 from auv_analysis.studies.identify.record import Record, long_enough, of_tracks
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.interface import GROUND_TRUTH, ODOM, WRENCH, WRENCH_APPLIED
+from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle
 
 OURS = {'odometry': ODOM, 'wrench': WRENCH}
+USUAL = 0.95  # quantile of a wrench that single peaks do not move
+CLIPPED = 1.5  # times what acts: more than a lag takes away
+NOTHING = 1e-3  # of the largest command of its kind
 
 
 def read_records(
@@ -57,11 +63,27 @@ def read_records(
     if not tracks[role].given.all():
         raise InputError(bag, role, 'all six components', 'some that no topic has')
     notes += contradictions(tracks, otherwise, mapping)
+    if not applied and WRENCH_APPLIED in tracks:
+        for note in _not_acting(tracks[WRENCH].rows, tracks[WRENCH_APPLIED].rows):
+            say(f'warning: {bag}: {note}')
+            notes.append(note)
     records = of_tracks(bag.name, tracks, role)
     if not any(record.known.any() for record in records):
         found = 'a velocity that never changes' if records else 'none'
         raise InputError(bag, '', 'a second and more with attitude, velocity and wrench', found)
     return records
+
+
+def _not_acting(command: np.ndarray, acting: np.ndarray) -> Iterator[str]:
+    """What acted far less than it was commanded, beyond what a lag does; (n, 6), (m, 6)."""
+    asked, given = (np.quantile(np.abs(rows), USUAL, axis=0) for rows in (command, acting))
+    least = np.repeat([NOTHING * asked[:3].max(), NOTHING * asked[3:].max()], 3)
+    less = (asked > CLIPPED * given) & (asked > least)
+    if less.any():
+        yield (
+            f'{join([DOFS[i] for i in np.flatnonzero(less)])}: much less acted than was commanded, '
+            'which the model takes for its wrench: see --applied'
+        )
 
 
 def without_constants(twist: Track, notes: list[str]) -> Track:
@@ -75,9 +97,11 @@ def without_constants(twist: Track, notes: list[str]) -> Track:
 def _ours(bag: Path, *, applied: bool) -> TopicMap:
     topics = survey(bag).types
     found = {}
-    for role, name in {**OURS, **({WRENCH_APPLIED: WRENCH_APPLIED} if applied else {})}.items():
+    for role, name in {**OURS, WRENCH_APPLIED: WRENCH_APPLIED}.items():
         some = [topic for topic in topics if topic.rpartition('/')[2] == name
                 and not topic.endswith(GROUND_TRUTH)]  # fmt: skip
+        if role == WRENCH_APPLIED and not applied and len(some) != 1:
+            continue
         if len(some) != 1:
             text = f'one topic {name}, or --odom, --wrench and --frames, or --map'
             raise InputError(bag, role, text, ', '.join(some) or 'none')

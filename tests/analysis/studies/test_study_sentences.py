@@ -199,10 +199,12 @@ def test_what_residuals_say() -> None:
     assert told([white, one, two]) == (
         'The residuals are not white in surge and yaw: autocorrelation up to 0.45'
     )
-    assert told([one, slow, white]) == (
+    lacks = (
         'The residuals are not white in surge and sway: in sway 50 % of their power lies below '
         f'{SLOW:g} Hz, of white noise 2.0 %; something slow acts that the model lacks'
     )
+    assert told([one, slow, white], current=True) == lacks
+    assert told([one, slow, white]) == f'{lacks}, as a current would (--free current)'
 
 
 @pytest.mark.parametrize(

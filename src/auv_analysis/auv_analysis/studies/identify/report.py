@@ -69,7 +69,7 @@ def results_of(found: Identified, notes: Sequence[str], *, accepted: bool = Fals
             'segment_length': len(found.problem.segments[0].command) * found.problem.step,
             'observer': found.problem.observer,
             'residual_rms': float((found.fit.cost / found.fit.rows) ** 0.5),
-            'residuals': told(white),
+            'residuals': told(white, current=any(r['name'].startswith('current.') for r in rows)),
             'noise': found.problem.noise.tolist(),
             'identified': identified,
             'not_identified': [row['name'] for row in rows if row['status'] != 'identified'],

@@ -73,8 +73,8 @@ def _of(some: Sequence[tuple[np.ndarray, float]]) -> dict[str, float]:
     }
 
 
-def told(rows: Sequence[Mapping[str, Any]]) -> str:
-    """What the residuals say, in a sentence."""
+def told(rows: Sequence[Mapping[str, Any]], *, current: bool = False) -> str:
+    """What the residuals say of a model with or without a current, in a sentence."""
     coloured = [row for row in rows if row['verdict'] != 'white']
     if not rows:
         return 'Whether the residuals are white cannot be told: no even rate, or too short'
@@ -89,4 +89,5 @@ def told(rows: Sequence[Mapping[str, Any]]) -> str:
         f'The residuals are not white in {names}: in {worst["dof"]} '
         f'{number(100 * worst["slow"], 2)} % of their power lies below {SLOW:g} Hz, of white noise '
         f'{number(100 * worst["slow_if_white"], 2)} %; something slow acts that the model lacks'
+        f'{"" if current else ", as a current would (--free current)"}'
     )

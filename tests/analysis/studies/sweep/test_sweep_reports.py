@@ -98,6 +98,14 @@ def test_a_broken_sweep_is_refused_in_one_line(tmp_path: Path, spoil, words: str
     assert '\n' not in str(refusal.value)
 
 
+def test_a_part_that_has_changed_is_said(tmp_path: Path) -> None:
+    out = make_sweep(tmp_path, SIMPLE, simple, range(3))
+    assert analysed(open_sweep(out)).notes == []
+    parquet.write_table(parquet.read_table(_part(out)), _part(out))
+    (note,) = analysed(open_sweep(out)).notes
+    assert note.startswith(f'{_part(out)}: not as it was written')
+
+
 def _part(out: Path) -> Path:
     return out / 'rollouts/part-00000001.parquet'
 

@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 
 from auv_analysis.metrics.measures import BY_NAME, FAMILIES, MEASURES, Measure, described
+from auv_analysis.output.folder import ROLLOUTS, listed_in, sha256_of
 from auv_analysis.output.new_files import known
 from auv_analysis.output.progress import each
 from auv_analysis.output.text import join
@@ -342,6 +343,7 @@ def analysed(sweep: Sweep, by: str = BEST_BY) -> Analysis:
     analysis = Analysis(sweep, factors_of(sweep), {name: [] for name in TABLES})
     groups, notes = designed(sweep)
     analysis.notes = [
+        *_changed(sweep),
         *notes,
         *_tied(sweep),
         *(n for group in groups for n in reached(sweep, group)),
@@ -363,6 +365,15 @@ def analysed(sweep: Sweep, by: str = BEST_BY) -> Analysis:
     _failures(analysis)
     analysis.tables['best'] = best(sweep, analysis.values, BY_NAME[by])
     return analysis
+
+
+def _changed(sweep: Sweep) -> Iterator[str]:
+    """Parts that are not what the manifest lists."""
+    listed = listed_in(sweep.folder) or {}
+    for path in sweep.parts:
+        found = sha256_of(path)
+        if listed.get(f'{ROLLOUTS}/{path.name}', found) != found:
+            yield f'{path}: not as it was written: its figures may be others'
 
 
 def _tied(sweep: Sweep) -> Iterator[str]:

@@ -15,7 +15,7 @@ import numpy as np
 from auv_analysis.bag.limits import MOST_NAMED
 from auv_analysis.bag.metadata import TABLES
 from auv_analysis.bag.reading import BagContents
-from auv_dynamics.files.errors import InputError, reason
+from auv_dynamics.files.errors import InputError, refusing
 
 CSV = 'csv'  # message type
 SEPARATORS = ',;\t'
@@ -114,13 +114,11 @@ class Table:
         self.places: dict[str, int] = {}  # column -> its place in a line
         self._number = 0  # of the line that was read
         self._first: list[str] = []  # line of numbers that was read with the head
-        try:
+        with refusing(file, '', 'a CSV file'):
             with file.open('rb') as stream:
                 is_wide = stream.read(2) in (BOM_UTF16_LE, BOM_UTF16_BE)  # as Windows writes it
             encoding = 'utf-16' if is_wide else 'utf-8-sig'
             self._stream = file.open(encoding=encoding, errors='replace', newline='')
-        except OSError as error:
-            raise InputError(file, '', 'a CSV file', reason(error)) from None
         try:
             self._read_head()
         except BaseException:

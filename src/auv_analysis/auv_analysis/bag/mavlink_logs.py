@@ -10,7 +10,7 @@ from auv_analysis.bag.metadata import BAG, LOGS, TopicExtent
 from auv_analysis.bag.onboard_log import OnboardLog
 from auv_analysis.bag.reading import BagContents
 from auv_analysis.bag.telemetry_log import Message, TelemetryLog
-from auv_dynamics.files.errors import InputError, reason
+from auv_dynamics.files.errors import InputError, refusing
 
 PARAMETERS = 'parameters'  # of BagContents.metadata
 SLOW = 9.0  # Hz, from which what should come at 10 Hz is too slow
@@ -65,15 +65,12 @@ def _opened(path: Path) -> 'Iterator[TelemetryLog | OnboardLog]':
         raise InputError(path, '', BAG, 'no such file')
     _library()
     kind = TelemetryLog if path.suffix.lower() == LOGS[0] else OnboardLog
-    try:
-        with path.open('rb') as file:
-            size = file.seek(0, 2)
-            if not size:
-                raise InputError(path, '', f'a {path.suffix} log', 'an empty file')
-            with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-                yield kind(path, data)
-    except OSError as error:
-        raise InputError(path, '', 'a file that can be read', reason(error)) from None
+    with refusing(path, '', 'a file that can be read'), path.open('rb') as file:
+        size = file.seek(0, 2)
+        if not size:
+            raise InputError(path, '', f'a {path.suffix} log', 'an empty file')
+        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            yield kind(path, data)
 
 
 def _library() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.cli.arguments import VEHICLE
-from auv_dynamics.files.errors import InputError, reason
+from auv_dynamics.files.errors import InputError, refusing
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -49,8 +49,6 @@ def _write(files: dict[Path, str]) -> None:
         if os.path.lexists(path):
             raise InputError(path, '', 'a name that is free here', 'an existing file')
     for path, text in files.items():
-        try:
-            with path.open('x', encoding='utf-8') as file:
-                file.write(text)
-        except OSError as error:
-            raise InputError(path, '', 'a file that can be written', reason(error)) from None
+        expected = 'a file that can be written'
+        with refusing(path, '', expected), path.open('x', encoding='utf-8') as file:
+            file.write(text)

@@ -16,7 +16,7 @@ import numpy as np
 
 from auv_analysis.formats.imported import Choices, ImportedVehicle
 from auv_analysis.output.progress import waiting
-from auv_dynamics.files.errors import InputError, first_line
+from auv_dynamics.files.errors import InputError, first_line, refusing
 from auv_dynamics.vehicle.vehicle import skew
 
 SUFFIXES = ('.stl', '.obj', '.ply', '.off', '.glb')
@@ -114,10 +114,8 @@ def _rounded(values: Any) -> Any:
 
 def _loaded(path: Path, trimesh: Any) -> Any:
     """Triangles of a file, with vertices merged and without what has no area."""
-    try:
+    with refusing(path, '', 'a mesh'):
         size = path.stat().st_size
-    except OSError as error:
-        raise InputError(path, '', 'a mesh', (error.strerror or str(error)).lower()) from None
     if size > LARGEST_FILE:
         raise InputError(path, '', f'a file of at most {LARGEST_FILE >> 20} MB', f'{size} bytes')
     try:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from auv_analysis.output.new_files import UNFINISHED, write
 from auv_analysis.output.progress import say
-from auv_dynamics.files.errors import FailedError, InputError, reason, undisturbed
+from auv_dynamics.files.errors import FailedError, InputError, refusing, undisturbed
 
 MANIFEST = 'manifest.json'
 Signature = tuple[int, int, int]  # of a file: inode, bytes, time of its last change in ns
@@ -92,6 +92,7 @@ def remove_empty(folders: Iterable[Path]) -> None:
             folder.rmdir()
 
 
+WRITABLE = 'a folder that can be written'
 STAGING = 'unfinished'  # folder of a result that is to replace another one
 SWEEP, CAMPAIGN, ROLLOUTS = 'sweep.json', 'campaign.yaml', 'rollouts'  # of a sweep
 PART = re.compile(r'part-(\d{8})\.parquet')
@@ -191,15 +192,13 @@ def check_free(out: Path, *, overwrite: bool, inputs: Iterable[Path]) -> None:
 def _make(out: Path) -> list[Path]:
     """Make a folder and see that it can be written; those that were not there, innermost first."""
     try:
-        missing = [path for path in (out, *out.parents) if not path.exists()]
-        str(out).encode()  # Arrow takes no other names
-        out.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=out).close()
+        with refusing(out, '--out', WRITABLE):
+            missing = [path for path in (out, *out.parents) if not path.exists()]
+            str(out).encode()  # Arrow takes no other names
+            out.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=out).close()
     except UnicodeEncodeError:
         raise InputError(out, '--out', 'a name in UTF-8', 'other bytes') from None
-    except OSError as error:
-        found = reason(error)
-        raise InputError(out, '--out', 'a folder that can be written', found) from None
     return missing
 
 
@@ -224,12 +223,9 @@ def _replaceable(
     out: Path, own: Sequence[str], inputs: Iterable[Path], *, overwrite: bool
 ) -> dict[str, Signature]:
     """Files of the results that may be replaced; none where the folder is empty."""
-    try:
+    with refusing(out, '--out', WRITABLE):
         if all(fnmatchcase(path.name, f'.*{UNFINISHED}') for path in out.iterdir()):
             return {}  # or a command was killed at its first file
-    except OSError as error:
-        found = reason(error)
-        raise InputError(out, '--out', 'a folder that can be written', found) from None
     if not overwrite:
         raise InputError(out, '--out', 'a new folder, or --overwrite', 'an existing folder')
     listed = listed_in(out)

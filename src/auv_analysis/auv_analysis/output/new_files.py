@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from auv_dynamics.files.errors import InputError, reason
+from auv_dynamics.files.errors import InputError, refusing
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -76,12 +76,9 @@ def write_text(path: Path, text: str, *, overwrite: bool, inputs: Iterable[Path]
 
     """
     check_file(path, overwrite=overwrite, inputs=inputs)
-    try:
+    with refusing(path, '--out', 'a file that can be written'):
         path.parent.mkdir(parents=True, exist_ok=True)
         write(path, text.encode())
-    except OSError as error:
-        found = reason(error)
-        raise InputError(path, '--out', 'a file that can be written', found) from None
 
 
 def check_file(path: Path, *, overwrite: bool, inputs: Iterable[Path] = ()) -> None:

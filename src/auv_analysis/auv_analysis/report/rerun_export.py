@@ -10,7 +10,7 @@ from auv_analysis.metrics.energy import kinetic_energy, shares
 from auv_analysis.output.new_files import created, unfinished_name
 from auv_analysis.report.plots import COLOURS, GREY
 from auv_analysis.runs.run import Run
-from auv_dynamics.files.errors import InputError, reason
+from auv_dynamics.files.errors import InputError, refusing
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.kinematics import quaternion
 from auv_gvc_controller.laws.model import control_model
@@ -54,12 +54,9 @@ def export(run: Run, path: Path) -> int:
     """
     rr = library()
     unfinished = unfinished_name(path)
-    try:
+    with refusing(path, '--out', 'a file that can be written'):
         path.parent.mkdir(parents=True, exist_ok=True)
         created(unfinished).close()  # rerun writes to a name
-    except OSError as error:
-        expected = 'a file that can be written'
-        raise InputError(path, '--out', expected, reason(error)) from None
     try:
         recording = rr.RecordingStream(APPLICATION, recording_id=run.scenario)
         recording.save(unfinished, default_blueprint=_blueprint())

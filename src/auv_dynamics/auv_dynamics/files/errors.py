@@ -42,6 +42,15 @@ def reason(error: OSError) -> str:
     return (error.strerror or str(error)).lower()
 
 
+@contextmanager
+def refusing(file: object, key: str, expected: str) -> Iterator[None]:
+    """Refuse a file or folder with what the system says while this lasts."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(file, key, expected, reason(error)) from None
+
+
 def first_line(error: BaseException) -> str:
     """What a library said of an error, as one line; its type where it said nothing."""
     return (str(error) or type(error).__name__).splitlines()[0]

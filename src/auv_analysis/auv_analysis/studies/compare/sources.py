@@ -17,7 +17,7 @@ from auv_analysis.runs.run import Hold, Run
 from auv_analysis.runs.samples import ENDING, load_samples
 from auv_analysis.scenario.scenario import Scenario, load_scenario
 from auv_analysis.simulation.simulate import announce, simulate
-from auv_dynamics.files.errors import InputError, reason
+from auv_dynamics.files.errors import InputError, refusing
 from auv_dynamics.files.shipped import shipped_by_name
 from auv_dynamics.files.yaml_files import read_yaml
 from auv_dynamics.ros.interface import ODOM
@@ -153,10 +153,8 @@ def _shipped(name: str) -> Path:
 
 def _of_folder(folder: Path) -> list[RunSource]:
     """Runs of a folder: a bag is one, results are as many as lie in them."""
-    try:
+    with refusing(folder, '', EXPECTED):
         entries = sorted(folder.iterdir())
-    except OSError as error:
-        raise InputError(folder, '', EXPECTED, reason(error)) from None
     if _make_a_bag(entries):
         return [RunSource('bag', folder)]
     names = _controllers(folder)

@@ -83,10 +83,7 @@ class RecordedController:
 
     def gains_of(self, law: str, given: Mapping[str, Any]) -> dict[str, Any]:
         """Gains for a law: those that are given, the others as they were recorded."""
-        try:
-            names = law_class(law)._fields
-        except ValueError as error:
-            raise InputError('--law', '', *refusal(error)[1:]) from None
+        names = law_class(law)._fields
         return {**{name: v for name, v in self.gains.items() if name in names}, **given}
 
 

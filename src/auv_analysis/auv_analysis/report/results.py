@@ -340,8 +340,10 @@ def terminal(table: Table, *, title: bool = False) -> rich_table.Table:
     title : whether its caption stands above
 
     """
-    caption = table.caption if title else None
-    shown = plain_table(title=caption)
+    shown = rich_table.Table(
+        title=table.caption if title else None, title_justify='left', box=None,
+        header_style='bold', pad_edge=False,
+    )  # fmt: skip
     for i, head in enumerate(table.columns):
         label = ' '.join(filter(None, [head.group, head.label]))
         label = f'{label}, {head.unit}' if head.unit else label
@@ -350,13 +352,6 @@ def terminal(table: Table, *, title: bool = False) -> rich_table.Table:
     for row in table.rows:
         shown.add_row(*(Text(cell.text, KINDS.get(cell.kind, '')) for cell in row))
     return shown
-
-
-def plain_table(**look: Any) -> rich_table.Table:
-    """The one set-up of tables in a terminal: no lines, bold heads."""
-    return rich_table.Table(
-        **{'box': None, 'header_style': 'bold', 'pad_edge': False, 'title_justify': 'left'} | look
-    )
 
 
 Shown = Column | Quantity | str  # what a column of a table is

@@ -181,6 +181,7 @@ def _of_scenario(
         single = {**values, **{path: column[i] for path, column in together.items()}}
         try:
             alone = changed_scenario(scenario, single)
+            alone.controller(controller)
         except InputError as error:
             reasons[i] = _reason(error)
             continue

@@ -354,12 +354,14 @@ def longest_stretch(
     whole : steps up to which rows that have to be picked are kept in memory
 
     """
-    found, notes = dict(series), list[str]()
+    found, notes, cuts = dict(series), list[str](), dict[str, list[int]]()
     for role, (ns, rows) in series.items():
-        stray = strays(ns, role, notes)
+        stamps = rows_of(ns, slice(None))
+        stray = strays(stamps, role, notes)
         if stray.any():
-            found[role] = ns[~stray], _picked(rows, np.flatnonzero(~stray), whole)
-    cuts = {role: stretches(ns) for role, (ns, _) in found.items()}
+            stamps = stamps[~stray]
+            found[role] = stamps, _picked(rows, np.flatnonzero(~stray), whole)
+        cuts[role] = stretches(stamps)
     edges = cuts[interface.ODOM]
     if len(edges) == 2:
         return found, notes

@@ -59,9 +59,10 @@ def longest_part(
     except (TypeError, ValueError):
         return slice(None), []
     x = values.get(interface.GROUND_TRUTH, values[interface.ODOM])
-    away = [np.abs(rows_of(x, here) - start).max(axis=1) for here in slices(len(x))]
-    far = np.concatenate(away)
-    resets = np.flatnonzero((far[1:] < BACK_AT) & (far[:-1] > AWAY)) + 1
+    blocks = (np.abs(rows_of(x, here) - start).max(axis=1) for here in slices(len(x)))
+    there = ((far < BACK_AT, far > AWAY) for far in blocks)
+    back, away = (np.concatenate(parts) for parts in zip(*there, strict=True))
+    resets = np.flatnonzero(back[1:] & away[:-1]) + 1
     if not (plant and len(resets)):
         return slice(None), []
     edges = [0, *resets.tolist(), len(ns)]

@@ -125,7 +125,7 @@ def _set_back(ns: np.ndarray) -> np.ndarray:
     Of messages that came late, the time that they are of had been left out before.
     """
     apart, found = np.diff(ns), list[int]()
-    if not np.any(apart > 0):
+    if not (np.any((apart < 0) & (apart >= -BACK)) and np.any(apart > 0)):
         return np.array(found, np.int64)
     period = float(np.median(apart[apart > 0]))
     falls = np.flatnonzero((apart < -GAP_PERIODS * period) & (apart >= -BACK))

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from auv_analysis.graph.supervisor import TroubleError
-from auv_analysis.metrics.authority import beyond_authority
+from auv_analysis.metrics.authority import beyond_authority, both_ways
 from auv_analysis.metrics.summary import Window, summarize
 from auv_analysis.output.folder import ResultsFolder, results_folder
 from auv_analysis.output.new_files import write_json
@@ -301,8 +301,8 @@ def conclude(
         say(sentence)
     console.print(summary_tables(summaries))
     for name, run in runs.items():
-        ways = run.tau.min(axis=0), run.tau.max(axis=0)
-        for remark in beyond_authority(run.vehicle, summaries[name]['effort']['max'], ways):
+        most = summaries[name]['effort']['max']
+        for remark in beyond_authority(run.vehicle, most, both_ways(run)):
             say(f'note: {name}: {remark}')
     return summaries
 

@@ -5,12 +5,20 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from auv_analysis.output.text import join, number
+from auv_analysis.runs.run import Run
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.thrusters import Thrusters
 from auv_dynamics.vehicle.vehicle import Vehicle
 
 NOTHING = 1e-6  # of the largest command of its kind: rounding
 UNITS = ('N', 'N', 'N', 'N m', 'N m', 'N m')
+
+
+def both_ways(run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest command of a run, (6,) each, N and N m; NaN: not recorded."""
+    each = [(block.tau.min(axis=0), block.tau.max(axis=0)) for block in run.blocks()]
+    low, high = zip(*each, strict=True)
+    return np.min(low, axis=0), np.max(high, axis=0)
 
 
 def beyond_authority(

@@ -8,6 +8,7 @@ the controller has refused them as well.
 """
 
 import contextlib
+import ctypes
 import math
 import tempfile
 from collections import Counter
@@ -40,6 +41,7 @@ from auv_dynamics.ros.interface import GAINS_FACT, LAW_FACT, SETTINGS_FACT, Fram
 
 Series = tuple[np.ndarray, np.ndarray]  # stamps (n,) in ns, values (n, 6) or (n, 13)
 TOGETHER = 64  # chunks whose small arrays are joined at once: thousands of them scatter the memory
+MMAP_THRESHOLD, LARGE = -3, 1 << 20  # of glibc's `mallopt`; bytes
 
 
 class SpooledColumn:
@@ -71,6 +73,9 @@ class SpooledColumn:
             self._small.clear()
 
     def _spool(self) -> None:
+        with contextlib.suppress(AttributeError):  # not every system has glibc
+            # what is freed goes back to the system: it would be kept, once larger arrays were freed
+            ctypes.CDLL(None).mallopt(MMAP_THRESHOLD, LARGE)
         try:
             self._file = self._file or tempfile.TemporaryFile()  # noqa: SIM115
             for rows in (*self._parts, *self._small):

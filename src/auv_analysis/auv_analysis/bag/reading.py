@@ -44,6 +44,12 @@ TOGETHER = 64  # chunks whose small arrays are joined at once: thousands of them
 MMAP_THRESHOLD, LARGE = -3, 1 << 20  # of glibc's `mallopt`; bytes
 
 
+def _give_back() -> None:
+    """Let arrays go back to the system when they are freed: glibc keeps those below larger ones."""
+    with contextlib.suppress(AttributeError):  # not every system has glibc
+        ctypes.CDLL(None).mallopt(MMAP_THRESHOLD, LARGE)
+
+
 class SpooledColumn:
     """Rows that come block by block: kept in memory up to a number of them, else in a file.
 
@@ -73,11 +79,10 @@ class SpooledColumn:
             self._small.clear()
 
     def _spool(self) -> None:
-        with contextlib.suppress(AttributeError):  # not every system has glibc
-            # what is freed goes back to the system: it would be kept, once larger arrays were freed
-            ctypes.CDLL(None).mallopt(MMAP_THRESHOLD, LARGE)
         try:
-            self._file = self._file or tempfile.TemporaryFile()  # noqa: SIM115
+            if self._file is None:
+                self._file = tempfile.TemporaryFile()  # noqa: SIM115
+                _give_back()
             for rows in (*self._parts, *self._small):
                 self._file.write(np.ascontiguousarray(rows).data)
         except OSError as error:
@@ -120,18 +125,18 @@ USUAL = 90.0  # percentile
 
 def stretches(ns: np.ndarray) -> list[int]:
     """Where the clock of stamps (n,) begins anew in the order of the bag, with 0 and n."""
-    anew = np.flatnonzero(np.diff(ns) < -BACK) + 1
-    return [0, *np.union1d(anew, _set_back(ns)).tolist(), len(ns)]
+    apart = np.diff(ns)
+    anew = np.flatnonzero(apart < -BACK) + 1
+    return [0, *sorted([*anew.tolist(), *_set_back(ns, apart)]), len(ns)]
 
 
-def _set_back(ns: np.ndarray) -> np.ndarray:
-    """Where stamps (n,) fall by less, and then count through a time that has been once more.
+def _set_back(ns: np.ndarray, apart: np.ndarray) -> Iterator[int]:
+    """Where stamps (n,), so far apart, fall by less, and count through a time once more.
 
     Of messages that came late, the time that they are of had been left out before.
     """
-    apart, found = np.diff(ns), list[int]()
     if not (np.any((apart < 0) & (apart >= -BACK)) and np.any(apart > 0)):
-        return np.array(found, np.int64)
+        return
     period = float(np.median(apart[apart > 0]))
     falls = np.flatnonzero((apart < -GAP_PERIODS * period) & (apart >= -BACK))
     for i in falls.tolist() if len(falls) <= MOST_FALLS else ():
@@ -140,8 +145,7 @@ def _set_back(ns: np.ndarray) -> np.ndarray:
         again, before = again[:count], ns[max(i + 1 - count, 0) : i + 1]
         walks = 2 * count * period >= -apart[i] and np.all(np.diff(again) > 0)
         if walks and 2 * np.count_nonzero((before >= again[0]) & (before <= again[-1])) >= count:
-            found.append(i + 1)
-    return np.array(found, np.int64)
+            yield i + 1
 
 
 def strays(ns: np.ndarray, topic: str, notes: list[str]) -> np.ndarray:

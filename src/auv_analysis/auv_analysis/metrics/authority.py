@@ -72,8 +72,8 @@ def _above_thrust(
     for i, dof in enumerate(DOFS):
         either = (largest[i], max(ahead[i], astern[i]))
         each = [] if ways is None else [(ways[0][i], -astern[i]), (ways[1][i], ahead[i])]
-        above = [pair for pair in (either, *each) if abs(pair[0]) > abs(pair[1])]
-        above = [(tau, most) for tau, most in above if tau * most >= 0.0]
+        above = [(tau, most) for tau, most in (either, *each)
+                 if abs(tau) > abs(most) and tau * most >= 0.0]  # fmt: skip
         if dof not in lost and above:
             tau, most = above[0]
             asked.append(f'{number(tau)} of at most {number(most)} {UNITS[i]} in {dof}')

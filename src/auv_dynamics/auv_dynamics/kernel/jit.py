@@ -47,7 +47,6 @@ with _without_asking_for_blas():
 types: Any = numba.types  # its own annotations know no named tuples
 FOLDER = cache_folder()
 KEPT = is_private(FOLDER)
-WRONG_LENGTH = 'another number of values than expected'
 if not KEPT:
     text = f'warning: {FOLDER}: not yours alone: compiled code is neither kept nor loaded'
     print(text, file=sys.stderr, flush=True)
@@ -111,7 +110,7 @@ def in_numbers(count: int) -> Any:
 
     def of_array(values: Any) -> Any:
         if len(values) != count:
-            raise ValueError(WRONG_LENGTH)
+            raise ValueError('another number of values than expected')
         return to_fixed_tuple(values, count)  # type: ignore[call-arg]
 
     def choose(values: Any) -> Any:

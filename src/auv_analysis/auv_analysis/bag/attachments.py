@@ -10,6 +10,7 @@ from typing import Any
 from auv_analysis.bag.reading import BagContents
 from auv_analysis.bag.step_topics import role_of
 from auv_analysis.scenario.fault_words import Mark, marks_of
+from auv_analysis.scenario.scaling import UNFIT
 from auv_dynamics.files.errors import InputError, printable
 from auv_dynamics.files.yaml_files import check, parse_yaml
 from auv_dynamics.plant.faults import ACTING, SENSING
@@ -22,7 +23,6 @@ from auv_gvc_controller.laws.law import is_unasked, make_gains
 
 NAME = re.compile('[A-Za-z0-9][A-Za-z0-9_.+-]{0,99}')
 LAW = re.compile(r'[A-Za-z_][\w.]*:[A-Za-z_]\w*', re.ASCII)  # module:Class
-UNFIT = re.compile('[^A-Za-z0-9_.+-]+')
 UNKNOWN = 'unknown'  # law of a bag without params.yaml
 Parameters = dict[str, dict[str, Any]]  # of nodes, by their names
 Scenario = dict[str, Any] | None  # of a bag; None: it carries none
@@ -109,7 +109,7 @@ def _nodes(entries: dict[str, Any], file: str, above: str = '') -> Iterator[tupl
 
 def step_of(parameters: dict[str, dict[str, Any]], bag: Path) -> float | None:
     """Control period, s; None where the parameters do not say it."""
-    step = parameters.get('plant_node', {}).get('step')
+    step = parameters.get(interface.PLANT, {}).get('step')
     if step is None:
         return None
     if not (isinstance(step, int | float) and 0 < step < float('inf')):

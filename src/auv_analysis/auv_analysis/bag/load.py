@@ -10,7 +10,7 @@ import numpy as np
 from auv_analysis.bag import attachments
 from auv_analysis.bag.attachments import Parameters
 from auv_analysis.bag.mcap_file import DAMAGED
-from auv_analysis.bag.plant_run import PLANT, longest_part, time_zero
+from auv_analysis.bag.plant_run import longest_part, time_zero
 from auv_analysis.bag.reading import (
     BagContents,
     Series,
@@ -112,7 +112,7 @@ def open_bag(
                if not (held and role in SETPOINTS)}  # fmt: skip
     dropped = [note for role, stamps in counted.items() for note in _dropped(role, stamps, len(ns))]
     known = attachments.vehicle_of(contents, bag, vehicle)
-    plant = parameters.get(PLANT, {})
+    plant = parameters.get(interface.PLANT, {})
     zero, missing = time_zero(ns, plant)
     kept, again = longest_part(ns, values, plant, zero)
     values = {role: rows[kept] for role, rows in values.items()}
@@ -188,7 +188,7 @@ def _facts(
     law, gains = attachments.law_and_gains(parameters.get(interface.CONTROLLER, {}), bag)
     scenario = attachments.scenario_of(contents, bag)
     faults, gaps = attachments.faults_of(scenario, known), _gaps(ns, zero)
-    if PLANT in parameters:  # whose time a fault is told in, that of the stamps
+    if interface.PLANT in parameters:  # whose time a fault is told in, that of the stamps
         late = zero / interface.NANOSECONDS
         faults = tuple(  # one that holds throughout goes on to do so
             f._replace(start=f.start and f.start - late, end=f.end - late) for f in faults

@@ -11,7 +11,6 @@ from auv_analysis.runs.run import rows_of
 from auv_dynamics.plant.plant import initial_state
 from auv_dynamics.ros import interface
 
-PLANT = 'plant_node'
 FEW = 3  # resets whose times are named
 BACK_AT, AWAY = 1e-12, 1e-6  # from where it started: a step from one to the other is a reset
 LOOSE = 1.0  # s that a recording in real time may lack at its end
@@ -53,6 +52,8 @@ def longest_part(
     zero : stamp from which time counts, ns
 
     """
+    if not plant:
+        return slice(None), []
     try:
         initial = [plant.get(f'initial.{key}', [0.0] * 6) for key in ('eta', 'nu')]
         start = initial_state(*np.array(initial, float).reshape(2, 6))
@@ -63,7 +64,7 @@ def longest_part(
     there = ((far < BACK_AT, far > AWAY) for far in blocks)
     back, away = (np.concatenate(parts) for parts in zip(*there, strict=True))
     resets = np.flatnonzero(back[1:] & away[:-1]) + 1
-    if not (plant and len(resets)):
+    if not len(resets):
         return slice(None), []
     edges = [0, *resets.tolist(), len(ns)]
     kept = int(np.argmax(np.diff(edges)))

@@ -16,7 +16,7 @@ from auv_gvc_controller.control.setpoint import SetpointSettings
 from auv_gvc_controller.control.setpoint_buffer import SAME
 from auv_gvc_controller.control.settings import EXACT, LATEST, ControllerSettings
 
-PLANT, SETPOINT, CONTROLLER = 'plant_node', 'setpoint_node', interface.CONTROLLER
+PLANT, SETPOINT, CONTROLLER = interface.PLANT, 'setpoint_node', interface.CONTROLLER
 ANALYSIS, RECORDER = 'analysis_node', interface.RECORDER
 EVERY = 10  # steps between live analysis samples
 WINDOW = 2000  # steps that the plant may be ahead of the recorder

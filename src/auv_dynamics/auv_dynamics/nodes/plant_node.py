@@ -245,7 +245,7 @@ class PlantNode(BulkNode):
     latency_critical = True
 
     def __init__(self, **options: Any):
-        super().__init__('plant_node', **options)
+        super().__init__(interface.PLANT, **options)
         self._born = time.monotonic()
         self.graph = NodeInterface(self)
         timeout = 30.0 if self.lockstep else 0.5
@@ -369,7 +369,7 @@ class PlantNode(BulkNode):
     def _on_run(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         reason = ''
         if request.data:
-            reason = self.peers.not_ready() or ('' if self.graph.ready() else 'plant_node')
+            reason = self.peers.not_ready() or ('' if self.graph.ready() else interface.PLANT)
         if not reason:
             self.paused = not request.data
             self.pace.resume() if request.data else self.pace.pause()

@@ -19,6 +19,7 @@ NOT_FINITE = 'not finite: expected finite numbers'
 PARENT = 'AUV_GVC_PARENT'  # variable with the process id of `auv run`: nodes do not outlive it
 RECORDER = 'recorder_node'  # name of the recorder, in whatever namespace
 CONTROLLER = 'controller_node'  # name of the controller, in whatever namespace
+PLANT = 'plant_node'  # name of the plant, in whatever namespace
 GAIN = 'gains.'  # what the names of its gains among its parameters begin with
 LAW_FACT, GAINS_FACT = 'law', 'gains'  # what it says of itself on `/diagnostics`; gains in JSON
 SETTINGS_FACT = 'changed'  # parameters by name, of those that are not as they were at its start

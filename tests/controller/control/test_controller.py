@@ -1,5 +1,6 @@
 """The velocity controller between its guards: pairing, silence, gaps, limits, recovery."""
 
+import contextlib
 import math
 
 import numpy as np
@@ -393,6 +394,31 @@ def test_what_a_silent_publisher_left_ahead_is_not_obeyed_when_another_begins(ac
         bench.pairing.setpoint((ms - 7) * MS, stop, ms / 1000)
         assert bench.odometry(ms).trouble == ''
         assert bench.pairing.find(ms * MS).nu_d == stop
+
+
+@pytest.mark.parametrize('acceleration', [DIFFERENCE, SAME])
+@pytest.mark.parametrize('late', [0, 7, 40])
+@pytest.mark.parametrize('first', ['derivative', 'setpoint'])
+def test_what_one_publisher_left_ahead_is_not_obeyed_once_another_is_heard(
+    acceleration, late, first
+):
+    bench, stop = Bench(setpoint=0.5, acceleration=acceleration, steepest=FILTER.steepest), ZERO
+    keep = {
+        'setpoint': lambda ms, at: bench.pairing.setpoint(ms * MS, stop, at),
+        'derivative': lambda ms, _: bench.pairing.derivative(ms * MS, stop),
+    }
+    for ms in range(0, 3000, 10):
+        bench.setpoint(ms, at=0.9)
+    for ms in range(0, 1000, 10):
+        bench.odometry(ms)
+    for ms in range(1000, 2500, 10):
+        for name in sorted(keep, key=first.__ne__):
+            with contextlib.suppress(ValueError):  # older than the last one that was obeyed
+                keep[name](ms - late, ms / 1000)
+        assert bench.odometry(ms).trouble == ''
+        found = bench.pairing.find(ms * MS)
+        assert found.ns == 990 * MS or (found.nu_d, found.nu_d_dot[1]) == (stop, 0.0)
+    assert found.nu_d == stop
 
 
 def test_integrals_do_not_outlive_a_watchdog():

@@ -115,9 +115,10 @@ class SetpointBuffer:
         backward difference of the set-points, zero at the first and over a jump; with 'none' and
         'filter' it is zero here
     limits : velocities and accelerations that are believed
-    steepest : (6,) bounds of the difference, m/s2 and rad/s2; set-points are then taken to be
-        `LEAST` apart at least, and the difference is zero once a set-point has been held for
-        longer than it took to come; None: none of this
+    steepest : real time: (6,) bounds of the difference, m/s2 and rad/s2; set-points are then taken
+        to be `LEAST` apart at least, the difference is zero once a set-point has been held for
+        longer than it took to come, and one stamped before those that wait takes the place of what
+        lies ahead: it is of another publisher, or of a new plan; None: none of this
 
     Attributes
     ----------
@@ -183,6 +184,10 @@ class SetpointBuffer:
     def _keep(
         self, buffer: OrderedDict[int, tuple[float, ...]], ns: int, values: tuple[float, ...]
     ) -> None:
+        if self._steepest is not None and ns < next(reversed(buffer), ns):
+            for ahead in (self._nu_d, self._nu_d_dot):
+                for stamp in [stamp for stamp in ahead if stamp >= ns]:
+                    del ahead[stamp]
         if self._used is not None and ns <= self._used.ns:
             raise ValueError(f'stamp late: expected later than {self._used.ns} ns, found {ns} ns')
         if ns in buffer:

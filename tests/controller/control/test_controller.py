@@ -372,6 +372,26 @@ def test_silence_of_set_points_does_not_wait_for_an_odometry():
     assert bench.controller.watchdog == 'no set-point heard for 0.5 s'
 
 
+@pytest.mark.parametrize('exact', [True, False])
+def test_a_wrench_that_is_taken_back_does_not_wait_for_an_odometry(exact):
+    """The set-point is too old by its stamp, and the odometry falls silent within the ramp."""
+    bench = Bench(exact=exact, acceleration=SAME, setpoint=0.3, odometry=2.0, ramp=0.2)
+    for ms in range(0, 100, 10):
+        bench.setpoint(ms)
+        bench.odometry(ms)
+    for ms in range(100, 501, 10):
+        if not exact:
+            bench.pairing.heard = ms / 1000
+        bench.odometry(ms)
+        begun = bench.watch(ms / 1000 + 0.005)
+    assert bench.controller.trips == 1
+    found = [bench.watch(ms / 1000) for ms in range(520, 800, 20)]
+    sizes = [abs(answer.tau[0]) for answer in (begun, *found) if answer]
+    assert sizes[0] > sizes[-1] == 0.0
+    assert sizes == sorted(sizes, reverse=True)
+    assert bench.controller.trips == 1
+
+
 def test_a_publisher_that_falls_silent_is_missed_however_far_ahead_it_was():
     bench = Bench(setpoint=0.5)
     for ms in range(0, 2000, 10):

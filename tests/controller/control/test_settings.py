@@ -98,7 +98,7 @@ def test_timeouts_ramp_and_filter_are_those_of_the_built_controller():
     controller, found = answered(settings(**live, ramp=0.2), 150)
     assert [one.trouble for one in found[:11]] == [''] * 11
     assert found[11].trouble.startswith('no set-point for 0.11 s')
-    assert controller.watch(Now(0.44)) is None
+    assert controller.watch(Now(0.44)).trouble.startswith('no set-point for')
     assert controller.watch(Now(0.46)).trouble.startswith('no odometry for 0.3 s')
     bare = {**live, 'setpoint_acceleration': 'none', 'setpoint_timeout': 9.0}
     (_, gentle), (_, steep) = (answered(settings(**bare, ramp=r), 30) for r in (0.2, 0.0))

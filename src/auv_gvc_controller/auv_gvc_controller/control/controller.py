@@ -239,7 +239,7 @@ class VelocityController:
             return self._trip(self._waiting[0], 'no set-point of its stamp', now)
         silence = now.steady - self._heard
         if silence <= late.odometry:
-            return self._watch_setpoints(now)
+            return self._watch_between(now)
         if self._in_charge and silence > 2 * late.odometry:  # it was stopped itself, and not heard
             self._output.drop()  # a vehicle has let go since: the old wrench would be a new one
         answer = self._trip(self._guard.last or 0, f'no odometry for {late.odometry:g} s', now)
@@ -247,12 +247,14 @@ class VelocityController:
             self._heard = None  # said
         return answer
 
-    def _watch_setpoints(self, now: Now) -> Answer | None:
+    def _watch_between(self, now: Now) -> Answer | None:
         """Let go between two odometries, however rare they are, until the wrench is zero."""
-        silent = '' if self._exact or self._output.idle else self._silent(now)
-        if silent and (self._in_charge or self.watchdog == silent):
-            return self._trip(self._guard.last or 0, silent, now)
-        return None
+        if self._output.idle:
+            return None
+        ns, silent = self._guard.last or 0, '' if self._exact else self._silent(now)
+        if silent and self._in_charge:
+            return self._trip(ns, silent, now)
+        return self._let_go(ns, self.watchdog, now) if self.watchdog else None
 
     @property
     def newest(self) -> int | None:

@@ -140,11 +140,11 @@ def test_a_quaternion_comes_out_with_a_norm_of_1() -> None:
 
 
 @pytest.mark.parametrize('lockstep', [True, False])
-def test_what_is_converted_waits_in_order_for_its_subscribers(lockstep: bool) -> None:
+def test_what_is_converted_before_it_is_heard_waits_in_lock_step_alone(lockstep: bool) -> None:
     given = {'lockstep': lockstep, 'expected_subscribers': ['cmd_vel=1']}
     stamps = [1_000_000_001, 1_000_000_002, 1_000_000_003]
     with program() as made:
-        made.add(FrameConverterNode, given)
+        node = made.add(FrameConverterNode, given)
         made.listen(topics.DIAGNOSTICS)
         said = made.heard[topics.DIAGNOSTICS.name]
 
@@ -160,6 +160,10 @@ def test_what_is_converted_waits_in_order_for_its_subscribers(lockstep: bool) ->
         assert converted() == {'cmd_vel converted': '3', **others}
         assert ns_of(said[-1]) == 0, 'nothing before there is a subscriber'
         made.listen(topics.CMD_VEL)
+        if not lockstep:
+            made.until(node.graph.ready, 'the subscriber')
+            stamps = [2_000_000_000]
+            made.publish(ENU_CMD_VEL, convert.twist(*stamps, UPRIGHT[7:], ENU))
         made.until(lambda: ns_of(said[-1]) == stamps[-1], 'the last of them')
         made.until(lambda: len(made.heard['cmd_vel']) >= len(stamps), 'all of them')
         assert [ns_of(m) for m in made.heard['cmd_vel']] == stamps

@@ -161,8 +161,9 @@ class FrameConverterNode(BulkNode):
             message = message_of(data, source.type, source.name)
             converted = convert(message, topic=source.name)
             self.graph.facts[count] += 1
-            self._held.append((publisher, converted))
-            self._publish_held()
+            if self.lockstep or self.graph.ready():  # in real time it would be old once it is heard
+                self._held.append((publisher, converted))
+                self._publish_held()
 
         self.graph.subscribe(source, take, qos)
         return publisher

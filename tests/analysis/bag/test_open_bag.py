@@ -172,6 +172,24 @@ def test_a_law_that_was_changed_while_it_was_recorded_is_not_that_of_its_file(tm
     assert summarize(run)['gains'] == {'K_D': None, 'K_f': None}
 
 
+@pytest.mark.parametrize(('names', 'law'), [
+    (['steersman', 'steersman'], 'gvc'), (['steersman', 'shadow'], 'gvc'),
+    (['shadow', 'controller_node'], 'cl'), (['controller_node', 'shadow'], 'gvc'),
+])  # fmt: skip
+def test_a_controller_of_another_name_says_its_law_as_well(tmp_path, names, law) -> None:
+    bag = Bag(tmp_path / 'bag.mcap')
+    bag.attach('vehicle.yaml', VEHICLE)
+    for k in range(9):
+        for made in (odometry(k * STEP, turning(k)), stamped('Wrench', k * STEP, np.ones(6))):
+            topic = '/odom' if made.__msgtype__ == ODOMETRY else '/wrench'
+            bag.add(topic, made.__msgtype__, k * STEP, serialized(made))
+        for name, said in zip(names, ('gvc', 'gvc' if names[0] == names[1] else 'cl'), strict=True):
+            facts = {'law': said, 'gains': json.dumps({gain: [1.0] for gain in GAINS})}
+            told = health(f'/{name}', k * STEP, facts)
+            bag.add('/diagnostics', told.__msgtype__, k * STEP, serialized(told))
+    assert load_run(bag.close()).law == law
+
+
 def test_a_step_that_nobody_says_is_the_usual_one(tmp_path) -> None:
     bag = Bag(tmp_path / 'bag.mcap')
     bag.attach('vehicle.yaml', VEHICLE)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import rclpy
 import yaml
-from helpers.made_messages import Bag, odometry, serialized, stamped
+from helpers.made_messages import Bag, health, odometry, serialized, stamped
 from helpers.shown import document_lines
 
 from auv_analysis.bag.step_topics import ACCEL, ODOMETRY, TWIST, WRENCH
@@ -43,11 +43,12 @@ def rows(count: int, width: int) -> np.ndarray:
 
 def write(
     path: Path, *, late: int = 0, accel: bool = True, lost: tuple = (), params: dict | None = None,
-    namespace: str = '', first: int = 0, told: bool = True,
+    namespace: str = '', first: int = 0, told: bool = True, changed: dict | None = None,
 ) -> Path:  # fmt: skip
     """Bag of a controller's messages; set-points are logged `late` steps behind their stamps.
 
-    `first`: number of its first step by its stamps; `told`: whether it has parameters.
+    `first`: number of its first step by its stamps; `told`: whether it has parameters; `changed`:
+    which of its settings it says to have changed, from a step on.
     """
     bag = Bag(path)
     bag.attach('vehicle.yaml', shipped('vehicles', VEHICLE).read_text())
@@ -74,6 +75,10 @@ def write(
         if accel:
             data = serialized(stamped('Accel', ns, slope[k]))
             bag.add(f'{namespace}/cmd_accel', ACCEL, ns, data)
+    for k, settings in (changed or {}).items():
+        facts = {'law': 'gvc', 'gains': json.dumps({name: [v] for name, v in GAINS.items()})}
+        said = health('/steersman', k * STEP, {**facts, 'changed': json.dumps(settings)})
+        bag.add('/diagnostics', said.__msgtype__, 10**18 + k, serialized(said))
     return bag.close()
 
 
@@ -210,6 +215,22 @@ def test_a_law_is_in_charge_from_the_answer_before_its_first_estimate(tmp_path: 
     assert np.array_equal(found.ns, ns[9:])
     series['disturbance_estimate'] = ns, 0.0 * f  # a law without one
     assert len(open_loop(replace(loop, series=series), 'gvc', GAINS).ns) == COUNT
+
+
+def test_settings_that_were_changed_hold_from_the_next_activation_on(tmp_path: Path) -> None:
+    """The controller has another name, and its computer another clock than the vehicle."""
+    changed = {0: {}, 9: {'limits.wrench': [0.5] * 6}, 24: {}, 39: {'limits.wrench': [0.1] * 6}}
+    loop = recorded_loop(write(tmp_path / 'bag.mcap', params=REAL_TIME, changed=changed))
+    assert (loop.controller.law, loop.notes) == ('gvc', ())
+    ns, tau = loop.series['wrench'][0], np.ones((COUNT, 6))
+    again = np.sort([*range(COUNT), 9, 24])  # zero: deactivated
+    tau = np.where(np.isin(np.arange(COUNT + 2), [10, 26])[:, None], 0.0, 1.0) * np.ones(6)
+    series = {**loop.series, 'wrench': (ns[again], tau)}
+    found = open_loop(replace(loop, series=series), 'gvc', GAINS)
+    most = np.abs(found.tau).max(axis=1)
+    assert found.ns.tolist() == ns.tolist()
+    assert (most[10:25] == 0.5).all()
+    assert most[:10].min() > 0.5 < most[25:].min()
 
 
 def test_where_no_wrench_answers_a_recorded_odometry_all_are_asked(tmp_path: Path) -> None:

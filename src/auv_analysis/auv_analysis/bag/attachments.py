@@ -26,6 +26,7 @@ LAW = re.compile(r'[A-Za-z_][\w.]*:[A-Za-z_]\w*', re.ASCII)  # module:Class
 UNKNOWN = 'unknown'  # law of a bag without params.yaml
 Parameters = dict[str, dict[str, Any]]  # of nodes, by their names
 Scenario = dict[str, Any] | None  # of a bag; None: it carries none
+FIRST_TAKEN = 'settings of the controller were changed while it was recorded, the first are taken'
 OWN = 2  # rank of parameters for the namespace; 1: for any, 0: for another
 
 
@@ -36,6 +37,23 @@ def parameters_of(contents: BagContents, bag: Path) -> Parameters:
     no other, since whatever names no namespace is of the recorder's vehicle. Law and gains are
     those that the controller says it has: they may have changed since the file was written.
     """
+    found = _written(contents, bag)
+    if contents.laws:
+        controller = found.get(contents.controller, found.get(CONTROLLER, {}))
+        found[CONTROLLER] = _in_charge(controller, contents)
+    return found
+
+
+def settings_in_turn(contents: BagContents, bag: Path) -> list[tuple[int, dict[str, Any]]]:
+    """Parameters of the controller with the settings that it says, as `BagContents.laws`."""
+    found = _written(contents, bag)
+    controller = found.get(contents.controller, found.get(CONTROLLER, {}))
+    return [
+        (ns, {**controller, **(_mapping(changed) or {})}) for (*_, changed), ns in contents.laws
+    ]
+
+
+def _written(contents: BagContents, bag: Path) -> Parameters:
     text = contents.attachments.get('params.yaml', '{}')
     file = f'{bag}: params.yaml'
     found: Parameters = {}
@@ -45,8 +63,6 @@ def parameters_of(contents: BagContents, bag: Path) -> Parameters:
         rank = OWN if space == own else int(not space or '*' in space)
         if rank >= ranks.get(node, OWN if contents.is_of_another else 0):
             found[node], ranks[node] = values, rank
-    if contents.laws:
-        found[CONTROLLER] = _in_charge(found.get(CONTROLLER, {}), contents)
     return found
 
 
@@ -67,8 +83,7 @@ def _in_charge(controller: dict[str, Any], contents: BagContents) -> dict[str, A
     law, text, changed = course[0][0]
     others |= _mapping(changed) or {}
     if len({told[2] for told, _ in course}) > 1:
-        note = 'settings of the controller were changed while it was recorded, the first are taken'
-        contents.notes.append(f'{note}: {printable(said)}')
+        contents.notes.append(f'{FIRST_TAKEN}: {printable(said)}')
     if len({told[:2] for told, _ in course}) > 1:
         note = 'law or gains were changed while it was recorded, none is taken'
         contents.notes.append(f'{note}: {printable(said)}')

@@ -37,7 +37,7 @@ from auv_analysis.bag.step_topics import (
 )
 from auv_dynamics.files.errors import FailedError, InputError, reason
 from auv_dynamics.ros import interface
-from auv_dynamics.ros.interface import GAINS_FACT, LAW_FACT, SETTINGS_FACT, Frames
+from auv_dynamics.ros.interface import CONTROLLER, GAINS_FACT, LAW_FACT, SETTINGS_FACT, Frames
 
 Series = tuple[np.ndarray, np.ndarray]  # stamps (n,) in ns, values (n, 6) or (n, 13)
 TOGETHER = 64  # chunks whose small arrays are joined at once: thousands of them scatter the memory
@@ -204,8 +204,9 @@ class BagContents(FileExtent):
     strict : whether every step had to come once and in order; where it had not, a driver was free
         to say anything, and what cannot be used is left out; None: the bag does not say
     laws : law, and in JSON its gains and the settings that were changed since the controller's
-        start, that it said to be in charge, one after the other, and the log time of the first
-        message that says so, ns
+        start, that it said to be in charge, one after the other, and the stamp of the last wrench
+        before it said so, ns
+    controller : name of the node that said so
 
     """
 
@@ -221,6 +222,7 @@ class BagContents(FileExtent):
     recorder: str | None = None
     strict: bool | None = None
     laws: list[tuple[tuple[str, ...], int]] = field(default_factory=list)
+    controller: str = CONTROLLER
 
     @property
     def is_of_another(self) -> bool:
@@ -334,20 +336,29 @@ class FileReader:
                 yield topic, entries[0][1]
 
     def _hear_controller(self, table: MessageTable, index: np.ndarray, channel: int) -> None:
-        """Note the laws that the controller of the vehicle that is read says to be in charge."""
-        name = f'{(self._contents.namespace or "").rstrip("/")}/{interface.CONTROLLER}'
-        known = self._contents.laws
+        """Note the laws that the controller of the vehicle that is read says to be in charge.
+
+        Of nodes of several names the usual one is heard, else the first one.
+        """
+        contents, known = self._contents, self._contents.laws
         for i in index.tolist():
-            if name.encode() not in table.message(i):
+            if GAINS_FACT.encode() not in table.message(i):
                 continue
             with contextlib.suppress(InputError, AttributeError, TypeError):
-                for status in self._health.message(table, i, channel).status:
+                message = self._health.message(table, i, channel)
+                for status in message.status:
                     facts = {one.key: one.value for one in status.values}
-                    if status.name == name and LAW_FACT in facts:
-                        changed = str(facts.get(SETTINGS_FACT, '{}'))
-                        told = str(facts[LAW_FACT]), str(facts.get(GAINS_FACT)), changed
-                        if not known or known[-1][0] != told:
-                            known.append((told, int(table.log_times[i])))
+                    space, _, name = status.name.rpartition('/')
+                    here = space == (contents.namespace or '').rstrip('/') and LAW_FACT in facts
+                    if not here or (known and name not in (contents.controller, CONTROLLER)):
+                        continue
+                    if name != contents.controller:
+                        contents.controller = name
+                        known.clear()
+                    changed = str(facts.get(SETTINGS_FACT, '{}'))
+                    told = str(facts[LAW_FACT]), str(facts.get(GAINS_FACT)), changed
+                    if not known or known[-1][0] != told:
+                        known.append((told, interface.nanoseconds(message.header.stamp)))
 
     def _found(
         self, table: MessageTable, members: dict[int, np.ndarray]

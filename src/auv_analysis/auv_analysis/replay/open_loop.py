@@ -7,7 +7,7 @@ In real time it is told what the recorded controller has answered, and begins an
 
 import heapq
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -46,11 +46,13 @@ class RecordedController:
     vehicle : what it knows
     bag : for refusals
     derivatives : whether nu_d_dot was recorded
+    told : parameters with later settings, and the stamp from which on it had them, ns
 
     Attributes
     ----------
     law, gains : as they were; 'unknown' and none where the bag does not say
     settings : what the node runs with where it is given the same parameters
+    in_turn : the settings of `told`
 
     Raises
     ------
@@ -59,19 +61,26 @@ class RecordedController:
     """
 
     def __init__(
-        self, parameters: Mapping[str, Any], vehicle: Vehicle, bag: Path, *, derivatives: bool
-    ):
+        self, parameters: Mapping[str, Any], vehicle: Vehicle, bag: Path, *, derivatives: bool,
+        told: Sequence[tuple[int, Mapping[str, Any]]] = (),
+    ):  # fmt: skip
         self._vehicle = vehicle
         self.law, self.gains = attachments.law_and_gains(dict(parameters), bag)
         source = f'{bag}: params.yaml: controller_node'
-        self.settings = recorded_settings(parameters, source)
-        if self.settings.setpoint_acceleration == SAME and not derivatives:
-            usual = usual_acceleration(self.settings.lockstep)
-            self.settings = replace(self.settings, setpoint_acceleration=usual)
+
+        def settings(values: Mapping[str, Any]) -> ControllerSettings:
+            found = recorded_settings(values, source)
+            if found.setpoint_acceleration == SAME and not derivatives:
+                return replace(found, setpoint_acceleration=usual_acceleration(found.lockstep))
+            return found
+
+        self.settings = settings(parameters)
+        self.in_turn = [(ns, settings(values)) for ns, values in told]
 
     def build(
-        self, law: str, gains: Mapping[str, Any], setpoints: SetpointBuffer
-    ) -> VelocityController:
+        self, law: str, gains: Mapping[str, Any], setpoints: SetpointBuffer,
+        settings: ControllerSettings,
+    ) -> VelocityController:  # fmt: skip
         """Controller with a law, and the set-points that have come; InputError: no such law."""
         try:
             made = make_gains(law, gains)
@@ -79,7 +88,8 @@ class RecordedController:
         except ValueError as error:
             gain, expected, found = refusal(error)
             raise InputError('--gain' if gain else '--law', gain, expected, found) from None
-        return self.settings.build(made, self._vehicle, setpoints)
+        setpoints.believe(*settings.believed)
+        return settings.build(made, self._vehicle, setpoints)
 
     def gains_of(self, law: str, given: Mapping[str, Any]) -> dict[str, Any]:
         """Gains for a law: those that are given, the others as they were recorded."""
@@ -193,19 +203,24 @@ def recorded_loop(
         raise NotOursError(bag, interface.CMD_VEL, 'messages', ', '.join(sorted(contents.types)))
     parameters = attachments.parameters_of(contents, bag)
     known, own = attachments.vehicle_of(contents, bag, vehicle), parameters.get(CONTROLLER, {})
-    controller = RecordedController(own, known, bag, derivatives=interface.CMD_ACCEL in series)
+    told = attachments.settings_in_turn(contents, bag)
+    derivatives = interface.CMD_ACCEL in series
+    controller = RecordedController(own, known, bag, derivatives=derivatives, told=told)
     begun = [UNTOLD] * ('params.yaml' not in contents.attachments)
+    notes = contents.notes
     if controller.settings.lockstep:  # whose clock never begins anew: only chunks may be swapped
         series = in_order(series)
-    elif not contents.strict:
-        series, anew = longest_stretch(series, math.inf)
-        begun += anew
+    else:  # settings are taken in turn
+        notes = [note for note in notes if not note.startswith(attachments.FIRST_TAKEN)]
+        if not contents.strict:
+            series, anew = longest_stretch(series, math.inf)
+            begun += anew
     return RecordedLoop(
         series,
         controller,
         attachments.scenario_name(attachments.scenario_of(contents, bag), bag),
         attachments.controller_name(parameters, bag),
-        (*contents.notes, *begun),
+        (*notes, *begun),
     )
 
 
@@ -237,7 +252,8 @@ def open_loop(
     """
     own = recorded.controller
     setpoints, course = own.settings.setpoints(), _Course(recorded)
-    controller, stretch, begin = own.build(law, gains, setpoints), 0, (0, 0)
+    controller = own.build(law, gains, setpoints, own.settings)
+    stretch, begin = 0, (0, 0)
     ramps: list[bool] = []
     answers: list[Answer] = []
     troubles: list[str] = []
@@ -247,7 +263,7 @@ def open_loop(
             if not now_in:
                 continue
             if now_in != stretch:
-                controller = own.build(law, gains, setpoints) if stretch else controller
+                controller = own.build(law, gains, setpoints, course.settings(now_in))
                 stretch, begin = now_in, (ns, len(answers))
         try:
             answer = _tell(controller, setpoints, role, ns, values)
@@ -287,11 +303,14 @@ class _Course:
     def __init__(self, recorded: RecordedLoop):
         ns, tau = recorded.series[interface.WRENCH]
         odometry = recorded.series[interface.ODOM][0]
-        settings = recorded.controller.settings
+        self._own = recorded.controller
+        settings = self._own.settings
         self.notes: tuple[str, ...] = ()
+        self._ends = dict[int, int]()  # ns, last answer of each time in charge
         answered, first = np.unique(ns, return_index=True)
         self._free = settings.lockstep or not np.isin(odometry, answered).any()
-        self._ramp = 0.0 if self._free else 1.5 * settings.ramp * interface.NANOSECONDS
+        ramp = max(one.ramp for _, one in [(0, settings), *self._own.in_turn])
+        self._ramp = 0.0 if self._free else 1.5 * ramp * interface.NANOSECONDS
         if self._free:
             first_ns = int(odometry.min())
             if settings.lockstep and 0 < first_ns < SAME_EPOCH:
@@ -315,6 +334,7 @@ class _Course:
         anew[1:] = ~active[:-1] | silenced[:-1] | (np.diff(answered) > silence)
         number = np.cumsum(anew & active)
         self._stretches = dict(zip(answered[active].tolist(), number[active].tolist(), strict=True))
+        self._ends = {number: ns for ns, number in self._stretches.items()}
         left = np.count_nonzero(~np.isin(odometry, answered[active]))
         lost = answered[active & ~np.isin(answered, odometry)]
         early = np.count_nonzero(lost < odometry.min())
@@ -332,6 +352,12 @@ class _Course:
     def stretch(self, ns: int) -> int:
         """Number of the time in charge that the odometry of a stamp belongs to; 0: to none."""
         return 1 if self._free else self._stretches.get(ns, 0)
+
+    def settings(self, stretch: int) -> ControllerSettings:
+        """Settings of a time in charge: the last ones that were told before its end."""
+        end = self._ends.get(stretch, 0)
+        told = [settings for ns, settings in self._own.in_turn if ns < end]
+        return told[-1] if told else self._own.settings
 
     def is_ramp(self, since: int, count: int) -> bool:
         """Whether an answer, so many ns and answers behind the first one, may be on the ramp."""

@@ -11,8 +11,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.shipped import shipped
+from auv_dynamics.kernel.compile import uncached
 from auv_dynamics.vehicle.kinematics import quaternion
-from auv_gvc_controller.control.sampled import SampledLaw, user_law
+from auv_gvc_controller.control.sampled import SampledLaw, state_rate, user_law
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model
 
@@ -180,3 +181,23 @@ def test_what_a_law_of_ones_own_raises_names_it(raised, text):
         raise raised
     with pytest.raises(KeyError), user_law(make_gains('cl', PAPER)):
         raise KeyError('a defect of ours stays what it is')
+
+
+@pytest.mark.parametrize('rates', [(), np.zeros(0)], ids=['tuple', 'array'])
+def test_a_law_without_states_is_compiled_as_well(rates):
+    class Nothing(NamedTuple):
+        k: Any
+        STATES = 0
+
+        @staticmethod
+        def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+            return rates
+
+    @uncached
+    def entries(six, state, gains):
+        change, total = state_rate(0.0, six, six, six, six, state, gains, six), 0.0
+        for i in range(state.shape[0]):
+            total += change[i]
+        return total
+
+    assert entries((0.0,) * 6, np.zeros(0), Nothing(np.ones(36))) == 0.0

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis import load_scenario, summarize
-from auv_analysis.bag.load import _slopes, load_run, open_bag
+from auv_analysis.bag.load import _slopes, load_run, obeyed, open_bag
 from auv_analysis.bag.metadata import RECORDING, recording_text
 from auv_analysis.bag.reading import read_bag, stretches
 from auv_analysis.cli.main import main
@@ -43,11 +43,11 @@ def state(k: int) -> np.ndarray:
 
 def write(
     folder: Path, stamps: list[int], setpoints: list[int], names: Any = None, *, ahead: int = 300,
-    unanswered: Any = (), **attached: str,
+    unanswered: Any = (), as_given: bool = False, **attached: str,
 ) -> Path:  # fmt: skip
     """Bag of odometry and wrenches at `stamps` in ms, and set-points, logged `ahead` of them.
 
-    `recording`: what its recorder says of it, '': nothing.
+    `recording`: what its recorder says of it, '': nothing; `as_given`: in the order of the lists.
     """
     names = names or {}
     bag = Bag(folder / 'bag.mcap', chunk_size=2000)
@@ -59,7 +59,7 @@ def write(
     plan = [(ms, 'odom', k, ms) for k, ms in enumerate(stamps)]
     plan += [(ms, 'wrench', k, ms) for k, ms in enumerate(stamps) if k not in unanswered]
     plan += [(ms - ahead, 'cmd_vel', k, ms) for k, ms in enumerate(setpoints)]
-    for _, role, k, ms in sorted(plan, key=lambda entry: entry[0]):
+    for _, role, k, ms in plan if as_given else sorted(plan, key=lambda entry: entry[0]):
         kind = {'wrench': 'Wrench', 'cmd_vel': 'Twist'}.get(role)
         made = stamped(kind, ms * MS, [float(k)] * 6) if kind else odometry(ms * MS, state(k))
         topic = names.get(role, f'/{role}')
@@ -272,6 +272,28 @@ def test_a_set_point_holds_no_longer_than_the_controller_holds_it(tmp_path, told
     assert run.samples == kept
     text = 'cmd_vel: older than 0.05 s, the timeout of the controller, at 4 of 10 odometry messages'
     assert any(text in note for note in run.notes) == (kept == 6)
+
+
+@pytest.mark.parametrize(('stamps', 'kept'), [
+    ([0, 1, 2, 3], [0, 1, 2, 3]), ([0, 10, 20, 30, 5, 15], [0, 4, 5]), ([0, 10, 10], [0, 1, 2]),
+    ([0, 20, 40, 10, 30, 15], [0, 3, 5]), ([100_000, 0, 100_010, 0], [0, 1, 2, 3]), ([], []),
+])  # fmt: skip
+def test_a_set_point_takes_the_place_of_those_that_lie_ahead_of_it(stamps, kept) -> None:
+    ns, rows = np.array(stamps, np.int64) * 1000 * MS, np.arange(6.0 * len(stamps)).reshape(-1, 6)
+    found = obeyed({'odom': (ns, rows), 'cmd_vel': (ns, rows)})
+    assert_array_equal(found['cmd_vel'][0], ns[kept])
+    assert_array_equal(found['cmd_vel'][1], rows[kept])
+    assert found['odom'][0] is ns
+
+
+@pytest.mark.parametrize('lockstep', ['false', 'true'])
+def test_what_another_publisher_left_ahead_was_not_followed(tmp_path, lockstep) -> None:
+    stamps, given = range(1000, 1200, GRID), [*range(1000, 1200, GRID), 1090, 1190]
+    params = '/**/controller_node:\n  ros__parameters: {setpoint_pairing: latest, '
+    params += f'lockstep: {lockstep}}}\n'
+    run = load_run(write(tmp_path, stamps, given, params=params, as_given=True))
+    later = [10] * 5 if lockstep == 'false' else range(5, 10)
+    assert_array_equal(run.nu_d[:, 0], [*range(5), *later])
 
 
 def test_set_points_that_were_always_too_old_are_none(tmp_path: Path) -> None:

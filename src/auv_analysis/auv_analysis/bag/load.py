@@ -36,6 +36,7 @@ REQUIRED = (interface.ODOM, interface.WRENCH)
 Steps = tuple[np.ndarray, dict[str, np.ndarray]]  # stamps (n,) in ns, role -> values
 SETPOINTS = (interface.CMD_VEL, interface.CMD_ACCEL)
 LATEST = 'latest'
+AHEAD = 60 * interface.NANOSECONDS  # ns, further than that no set-point lies ahead
 PAIRED = 0.75  # share of odometry with a set-point of its stamp, from which each should have one
 
 
@@ -100,7 +101,11 @@ def open_bag(
     free = contents.strict is False or (contents.strict is None and _have_own_stamps(series))
     if held := controller.get('setpoint_pairing', LATEST if free else None) == LATEST:
         timeout = controller.get('setpoint_timeout')
-        if controller.get('lockstep') is True or not isinstance(timeout, int | float):
+        if controller.get('lockstep') is True:
+            timeout = math.inf
+        else:
+            series = obeyed(series, whole)
+        if not isinstance(timeout, int | float):
             timeout = math.inf
         series, aged = held_series(series, whole, timeout)
         begun += aged
@@ -429,6 +434,22 @@ def _picked(rows: np.ndarray, index: np.ndarray, whole: float) -> np.ndarray:
     if not len(index):
         return rows[:0]
     return gathered((rows_of(rows, index[here]) for here in slices(len(index))), whole)
+
+
+def obeyed(series: Mapping[str, Series], whole: float = math.inf) -> dict[str, Series]:
+    """The series, role -> stamps in the order of the bag and rows, as a controller follows them.
+
+    In real time a set-point that comes takes the place of those that lie ahead of its stamp.
+    """
+    found = dict(series)
+    for role in SETPOINTS:
+        if role in series and not _is_rising(series[role][0]):
+            ns, rows = series[role]
+            late = np.maximum.accumulate(ns) - ns > AHEAD  # refused: of no time that lies ahead
+            later = np.where(late, np.iinfo(np.int64).max, ns)
+            kept = np.flatnonzero(ns <= np.minimum.accumulate(later[::-1])[::-1])
+            found[role] = ns[kept], _picked(rows, kept, whole)
+    return found
 
 
 def held_series(

@@ -18,6 +18,7 @@ from auv_analysis.bag import attachments
 from auv_analysis.bag.load import (
     in_order,
     longest_stretch,
+    obeyed,
     read_vehicle,
     topics_of_one_graph,
 )
@@ -215,6 +216,7 @@ def recorded_loop(
         if not contents.strict:
             series, anew = longest_stretch(series, math.inf)
             begun += anew
+        series = obeyed(series)
     return RecordedLoop(
         series,
         controller,

@@ -202,14 +202,6 @@ class SweepStoppedError(FailedError):
     """The sweep ended before its last block; what is finished is kept."""
 
 
-@dataclass(frozen=True)
-class _Task:
-    block: int
-    first: int
-    seeds: np.ndarray
-    changes: dict[str, Values]
-
-
 def sweep(
     campaign: Campaign,
     folder: SweepFolder,
@@ -236,18 +228,54 @@ def sweep(
     SweepStoppedError : it was interrupted, or a block failed; the same sweep goes on from there
 
     """
-    run = _Run(campaign, folder, executor, in_flight, progress)
+    outcome, contents, size = Outcome(), contents_of(campaign), folder.block
+    pending: dict[Future[Any], tuple[int, np.ndarray, dict[str, Values]]] = {}
+
+    def count(rows: pa.Table) -> None:
+        outcome.add(rows, len(campaign.controllers))
+        progress(outcome.rollouts)
+
+    def store_next() -> None:
+        done, _ = wait(pending, return_when=FIRST_COMPLETED)
+        for future in done:
+            first, seeds, changes = pending.pop(future)
+            rows = table_of(first, seeds, changes, future.result())
+            folder.store(first // size, rows)
+            count(rows)
+
+    def cancel() -> None:
+        for future in list(pending):
+            if future.cancel():
+                del pending[future]
+
+    finished = set()
+    for block, rows in folder.finished(['controller', 'status', 'reason']):
+        finished.add(block)
+        count(rows)
+    outcome.before = outcome.rollouts
     try:
-        run.all()
+        for block in range(-(-campaign.rollouts // size)):
+            if block in finished:
+                continue
+            first, last = block * size, min((block + 1) * size, campaign.rollouts)
+            seeds, changes = campaign.seeds(first, last), campaign.values(first, last)
+            while len(pending) >= in_flight():
+                store_next()
+            asked = contents, campaign.controllers, campaign.hold, changes, seeds
+            pending[executor.submit(block_figures, *asked)] = first, seeds, changes
+        while pending:
+            store_next()
     except KeyboardInterrupt:
-        run.finish_running()
+        cancel()
+        while pending:  # what cannot be cancelled any more
+            store_next()
         raise SweepStoppedError('interrupted') from None
     except Exception as error:
-        run.cancel()
+        cancel()
         if (why := _why(error)) is None:
             raise
         raise SweepStoppedError(why) from error
-    return run.outcome
+    return outcome
 
 
 def _why(error: Exception) -> str | None:
@@ -258,80 +286,6 @@ def _why(error: Exception) -> str | None:
     if isinstance(error, BlockError | ArithmeticError | OSError):
         return first_line(error)
     return None
-
-
-class _Run:
-    def __init__(
-        self,
-        campaign: Campaign,
-        folder: SweepFolder,
-        executor: Executor,
-        in_flight: Callable[[], int],
-        progress: Callable[[int], None],
-    ):
-        self._campaign, self._folder, self._executor = campaign, folder, executor
-        self._in_flight, self._progress = in_flight, progress
-        self._contents = contents_of(campaign)
-        self._pending: dict[Future[Any], _Task] = {}
-        self.outcome = Outcome()
-        self._done = self._read_finished()
-
-    def all(self) -> None:
-        """Run every block that is not finished."""
-        for task in self._tasks():
-            while len(self._pending) >= self._in_flight():
-                self._store_next()
-            self._submit(task)
-        while self._pending:
-            self._store_next()
-
-    def finish_running(self) -> None:
-        """Store the blocks that cannot be cancelled any more."""
-        self.cancel()
-        while self._pending:
-            self._store_next()
-
-    def cancel(self) -> None:
-        """Drop what has not begun."""
-        for future in list(self._pending):
-            if future.cancel():
-                del self._pending[future]
-
-    def _tasks(self) -> Iterator[_Task]:
-        campaign, size = self._campaign, self._folder.block
-        for block in range(-(-campaign.rollouts // size)):
-            if block not in self._done:
-                first, last = block * size, min((block + 1) * size, campaign.rollouts)
-                yield _Task(block, first, campaign.seeds(first, last), campaign.values(first, last))
-
-    def _submit(self, task: _Task) -> None:
-        campaign = self._campaign
-        future = self._executor.submit(
-            block_figures, self._contents, campaign.controllers, campaign.hold, task.changes,
-            task.seeds,
-        )  # fmt: skip
-        self._pending[future] = task
-
-    def _store_next(self) -> None:
-
-        done, _ = wait(self._pending, return_when=FIRST_COMPLETED)
-        for future in done:
-            task = self._pending.pop(future)
-            rows = table_of(task.first, task.seeds, task.changes, future.result())
-            self._folder.store(task.block, rows)
-            self._count(rows)
-
-    def _count(self, rows: pa.Table) -> None:
-        self.outcome.add(rows, len(self._campaign.controllers))
-        self._progress(self.outcome.rollouts)
-
-    def _read_finished(self) -> set[int]:
-        done = set()
-        for block, rows in self._folder.finished(['controller', 'status', 'reason']):
-            self._count(rows)
-            done.add(block)
-        self.outcome.before = self.outcome.rollouts
-        return done
 
 
 AHEAD = 2  # blocks handed over for each worker: one runs, one waits

@@ -55,7 +55,7 @@ def test_a_path_of_another_controller_has_no_say(results: Analysis) -> None:
 
 def test_spearman_is_that_of_scipy(results: Analysis) -> None:
     varied = next(v for v in results.factors if v.path == DAMPING)
-    mine = results.rows_of('cl')
+    mine = results.sweep.finished['cl']
     (row,) = rows(results, 'influence', figure=ENERGY, controller='cl', path=DAMPING)
     expected = spearmanr(varied.numbers[mine], results.values[ENERGY][mine]).statistic
     assert row['spearman'] == pytest.approx(expected)
@@ -102,7 +102,7 @@ def test_two_paths_together(results: Analysis) -> None:
 def test_rows_that_settle_in_half(results: Analysis) -> None:
     name = 'velocity_error.settling_time.heave'
     (row,) = rows(results, 'quantiles', figure=name, controller='gvc')
-    share = np.mean(results.factors[0].numbers[results.rows_of('gvc')] > 2.0)
+    share = np.mean(results.factors[0].numbers[results.sweep.finished['gvc']] > 2.0)
     assert (row['rows'], row['known'] / row['rows']) == (800, pytest.approx(share))
     assert row['high'] is None, 'of a time, what does not exist is late'
     assert row['largest'] == 1.0
@@ -112,7 +112,7 @@ def test_best_rows_are_the_smallest(results: Analysis) -> None:
     found = analysed(results.sweep, ENERGY).tables['best']
     mine = [row for row in found if row['controller'] == 'cl']
     assert [row['rank'] for row in mine] == list(range(1, 11))
-    assert mine[0][ENERGY] == np.nanmin(results.values[ENERGY][results.rows_of('cl')])
+    assert mine[0][ENERGY] == np.nanmin(results.values[ENERGY][results.sweep.finished['cl']])
     assert mine[0][ENERGY] == pytest.approx(1.5 * mine[0][K_D] ** 2)
     energies = [row[ENERGY] for row in mine]
     assert energies == sorted(energies)
@@ -222,7 +222,7 @@ def test_what_some_rows_do_not_have_is_judged_by_the_others(tmp_path) -> None:
     (row,) = rows(found, 'influence', figure=name, controller='gvc', path=K_D)
     assert row['spearman'] == pytest.approx(1.0)
     (other,) = rows(found, 'influence', figure=name, controller='gvc', path=DAMPING)
-    mine = found.rows_of('gvc')[~np.isnan(found.values[name][found.rows_of('gvc')])]
+    mine = found.sweep.finished['gvc'][~np.isnan(found.values[name][found.sweep.finished['gvc']])]
     damping = next(factor for factor in found.factors if factor.path == DAMPING)
     assert other['spearman'] == pytest.approx(
         spearmanr(damping.numbers[mine], found.values[name][mine]).statistic

@@ -141,7 +141,7 @@ def test_of_many_rows_some_from_all_over_are_drawn(simple: Drawn, monkeypatch) -
     figure, _, caption = plots._dependence(analysis, factor, main_measures(analysis)[:1])
     dots = [points(x) for x in artists.lines(figure.axes[0]) if x.get_linestyle() == 'None']
     for controller, (x, _) in zip(('gvc', 'cl'), dots, strict=True):
-        mine = analysis.rows_of(controller)
+        mine = analysis.sweep.finished[controller]
         assert np.array_equal(x, factor.numbers[mine[: 7 * (len(mine) // 7) : len(mine) // 7]])
     assert caption.endswith(' Points: at most 7 rows of each controller.')
 
@@ -179,7 +179,7 @@ def test_dependence_shows_the_quantiles_along_its_path(simple: Drawn) -> None:
                     _banded(axes, figure, controller, k, wanted)
                     dots = [points(x) for x in artists.lines(axes) if x.get_linestyle() == 'None']
                     x, y = dots[k]
-                    rows_ = analysis.rows_of(controller)
+                    rows_ = analysis.sweep.finished[controller]
                     assert np.array_equal(x, factors[path].numbers[rows_])
                     assert np.array_equal(y, analysis.values[measure.name][rows_], equal_nan=True)
                 else:

@@ -48,8 +48,8 @@ def _spreads(analysis: 'Analysis', columns: Mapping[str, np.ndarray]) -> None:
         label, unit, meaning = described(name)
         said = {'figure': name, 'label': label, 'unit': unit, 'meaning': meaning}
         analysis.spreads[name] = [
-            {'controller': controller} | said | spread(values[analysis.rows_of(controller)], unit)
-            for controller in analysis.sweep.controllers
+            {'controller': controller} | said | spread(values[rows], unit)
+            for controller, rows in analysis.sweep.finished.items()
         ]
 
 
@@ -104,52 +104,45 @@ def explained(ranks: np.ndarray, codes: np.ndarray) -> float:
     return float(np.clip(1.0 - within, 0.0, 1.0))
 
 
-def along(figure: Ordered, codes: np.ndarray, factor: Factor, measure: Measure) -> Iterator[Row]:
-    """Quantiles of a figure in each group of a path.
-
-    Parameters
-    ----------
-    figure : its values in the m rows that count
-    codes : (m,) group of each row
-    factor : the path
-    measure : whose values they are
-
-    """
+def along(
+    controller: str, figure: Ordered, codes: np.ndarray, factor: Factor, measure: Measure
+) -> Iterator[Row]:
+    """Quantiles of a figure in each group of a path, by the group (m,) of each row."""
     count = len(factor.labels)
     groups, rows = figure.groups(codes, count), np.bincount(codes, minlength=count)
     for i, (label, group) in enumerate(zip(factor.labels, groups, strict=True)):
-        row: Row = {'path': factor.path, 'figure': measure.name, 'unit': measure.unit}
-        row |= {'group': i, 'value': label, 'middle': factor.middles[i]}
+        row: Row = {'controller': controller, 'path': factor.path, 'figure': measure.name}
+        row |= {'unit': measure.unit, 'group': i, 'value': label, 'middle': factor.middles[i]}
         ends = (None, None) if factor.edges is None else map(float, factor.edges[i])
-        yield (
-            row
-            | dict(zip(('from', 'to'), ends, strict=True))
-            | spread_of_sorted(group, int(rows[i]))
-        )
+        row |= dict(zip(('from', 'to'), ends, strict=True))
+        yield row | spread_of_sorted(group, int(rows[i]))
 
 
-def together(
-    values: np.ndarray, rows: np.ndarray, pair: Sequence[Factor], measure: Measure
-) -> Iterator[Row]:
-    """Median of a figure for each combination of the groups of two paths.
-
-    Parameters
-    ----------
-    values, rows, measure : as of `along`
-    pair : two paths; bins are merged until they are few
-
-    """
-    first, second = (merged(factor) for factor in pair)
-    width = len(second[1])
-    codes = first[0][rows] * np.int32(width) + second[0][rows]
-    groups = by_group(values[rows], codes, len(first[1]) * width)
-    for i, group in enumerate(groups):
-        at = quantiles(ordered(group, measure.unit), [0.5])[0]
-        names = {'figure': measure.name, 'unit': measure.unit}
-        names |= {'path': pair[0].path, 'value': first[1][i // width]}
-        names |= {'other_path': pair[1].path, 'other_value': second[1][i % width]}
-        count = int(np.isfinite(group).sum())
-        yield names | {'rows': len(group), 'known': count, 'median': known(at)}
+def together(analysis: 'Analysis') -> Iterator[Row]:
+    """Median of each measure for each combination of the groups of the two paths of `pair`."""
+    pair, sweep = analysis.pair, analysis.sweep
+    if len(pair) < 2:
+        return
+    (codes, labels), (others, beside) = map(merged, pair)
+    for measure, controller in product(analysis.measures, sweep.controllers):
+        if not all(factor.concerns(controller) for factor in pair):
+            continue
+        rows, values = sweep.finished[controller], analysis.values[measure.name]
+        cells = codes[rows] * np.int32(len(beside)) + others[rows]
+        groups = by_group(values[rows], cells, len(labels) * len(beside))
+        for (label, other), group in zip(product(labels, beside), groups, strict=True):
+            yield {
+                'controller': controller,
+                'figure': measure.name,
+                'unit': measure.unit,
+                'path': pair[0].path,
+                'value': label,
+                'other_path': pair[1].path,
+                'other_value': other,
+                'rows': len(group),
+                'known': int(np.isfinite(group).sum()),
+                'median': known(quantiles(ordered(group, measure.unit), [0.5])[0]),
+            }
 
 
 def merged(factor: Factor) -> tuple[np.ndarray, list[str]]:
@@ -164,24 +157,23 @@ def merged(factor: Factor) -> tuple[np.ndarray, list[str]]:
     return factor.codes // step, joined
 
 
-def failures(factor: Factor, status: np.ndarray, rows: np.ndarray) -> Iterator[Row]:
-    """Shares of diverged and refused rows in each group of a path.
-
-    Parameters
-    ----------
-    factor : the path
-    status : (n,) places in `STATUSES`
-    rows : (m,) indices of the rows that count
-
-    """
-    groups = by_group(status[rows], factor.codes[rows], len(factor.labels))
-    for label, group in zip(factor.labels, groups, strict=True):
-        row: Row = {'path': factor.path, 'value': label, 'rows': len(group)}
-        for place, word in enumerate(STATUSES[1:], start=1):
-            count = int((group == place).sum())
-            share = 100.0 * count / len(group) if len(group) else None
-            row |= {word: count, f'{word}_percent': share}
-        yield row
+def failures(analysis: 'Analysis') -> Iterator[Row]:
+    """Shares of diverged and refused rows of each controller in each group of each path."""
+    sweep = analysis.sweep
+    if not (sweep.status != 0).any():
+        return
+    for i, controller in enumerate(sweep.controllers):
+        rows = np.flatnonzero(sweep.controller == i)
+        for factor in analysis.varied(controller):
+            groups = by_group(sweep.status[rows], factor.codes[rows], len(factor.labels))
+            for label, group in zip(factor.labels, groups, strict=True):
+                row: Row = {'controller': controller, 'path': factor.path, 'value': label}
+                row['rows'] = len(group)
+                for place, word in enumerate(STATUSES[1:], start=1):
+                    count = int((group == place).sum())
+                    share = 100.0 * count / len(group) if len(group) else None
+                    row |= {word: count, f'{word}_percent': share}
+                yield row
 
 
 def pairs(sweep: Sweep, values: np.ndarray, measure: Measure) -> Iterator[Row]:
@@ -221,29 +213,18 @@ def pairs(sweep: Sweep, values: np.ndarray, measure: Measure) -> Iterator[Row]:
         }
 
 
-def best(
-    sweep: Sweep, figures: Mapping[str, np.ndarray], by: Measure, count: int = COUNT
-) -> list[Row]:
-    """Rows of each controller with the smallest values of a measure, with all that they have.
-
-    Parameters
-    ----------
-    sweep : whose rows they are
-    figures : measure -> (n,) of all rows
-    by : by which they are sorted
-    count : at most so many of a controller
-
-    """
-    values, found = figures[by.name], []
+def best(analysis: 'Analysis', by: Measure) -> list[Row]:
+    """Rows of each controller with the smallest values of a measure, with all that they have."""
+    sweep, values, found = analysis.sweep, analysis.values[by.name], []
     given_rows = sweep.table(['index', 'seed', *sweep.paths])
-    for i, controller in enumerate(sweep.controllers):
-        rows = np.flatnonzero((sweep.controller == i) & (sweep.status == 0) & np.isfinite(values))
-        places = rows[np.argsort(values[rows], kind='stable')[:count]]
+    for controller, finished in sweep.finished.items():
+        rows = finished[np.isfinite(values[finished])]
+        places = rows[np.argsort(values[rows], kind='stable')[:COUNT]]
         table = given_rows.take(places).to_pylist()
         for rank, (place, given) in enumerate(zip(places, table, strict=True), start=1):
             row = {'by': by.name, 'controller': controller, 'rank': rank}
             row |= {'rollout': given.pop('index'), **given}
-            found.append(row | {m.name: figures[m.name][place] for m in MEASURES})
+            found.append(row | {m.name: analysis.values[m.name][place] for m in MEASURES})
     return found
 
 
@@ -269,6 +250,7 @@ class Analysis:
     pair : the two paths that matter most; none where there are fewer
     notes : what is worth saying, one line each
     spreads : figure -> its rows of the table `quantiles`
+    ranks : path, controller -> ranks of its numbers in the finished rows; None of words and lists
 
     """
 
@@ -281,35 +263,21 @@ class Analysis:
     pair: list[Factor] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     spreads: dict[str, list[Row]] = field(default_factory=dict)
-    _rows: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
-    _ranks: dict[tuple[str, str], np.ndarray] = field(default_factory=dict, repr=False)
+    ranks: dict[tuple[str, str], np.ndarray | None] = field(default_factory=dict)
 
-    def rows_of(self, controller: str) -> np.ndarray:
-        """Indices of the rows of a controller that have figures."""
-        if controller not in self._rows:
-            place = self.sweep.controllers.index(controller)
-            mine = (self.sweep.controller == place) & (self.sweep.status == 0)
-            self._rows[controller] = np.flatnonzero(mine)
-        return self._rows[controller]
-
-    def ranks_of(self, factor: Factor, controller: str) -> np.ndarray | None:
-        """Ranks of the numbers of a path in these rows; None of words and lists."""
-        if factor.numbers is None:
-            return None
-        key = factor.path, controller
-        if key not in self._ranks:
-            self._ranks[key] = Ordered.of(factor.numbers[self.rows_of(controller)]).ranks
-        return self._ranks[key]
+    def varied(self, controller: str) -> list[Factor]:
+        """Paths that differ and affect a controller."""
+        return [v for v in self.factors if v.differs and v.concerns(controller)]
 
     def counts(self) -> list[Row]:
         """Rows of each controller by status."""
-        return [self._count(i, name) for i, name in enumerate(self.sweep.controllers)]
-
-    def _count(self, place: int, name: str) -> Row:
-        mine = self.sweep.controller == place
-        row: Row = {'controller': name, 'rows': int(mine.sum())}
-        row |= {s: int((self.sweep.status[mine] == i).sum()) for i, s in enumerate(STATUSES)}
-        return row
+        found: list[Row] = []
+        for i, name in enumerate(self.sweep.controllers):
+            status = self.sweep.status[self.sweep.controller == i]
+            counts = np.bincount(status, minlength=len(STATUSES)).tolist()
+            of_each = dict(zip(STATUSES, counts, strict=True))
+            found.append({'controller': name, 'rows': len(status)} | of_each)
+        return found
 
     def reasons(self) -> list[Row]:
         """The commonest reasons of what was refused or diverged."""
@@ -349,9 +317,11 @@ def analysed(sweep: Sweep, by: str = BEST_BY) -> Analysis:
         *(n for group in groups for n in reached(sweep, group)),
     ]
     with ThreadPoolExecutor(THREADS) as pool:
-        for factor, controller in product(analysis.factors, sweep.controllers):
-            if factor.differs and factor.concerns(controller):
-                pool.submit(analysis.ranks_of, factor, controller)  # which every measure needs
+        asked = [(factor, name) for name in sweep.controllers for factor in analysis.varied(name)]
+        ranks = pool.map(partial(_ranks_of, sweep), asked)
+        analysis.ranks = {
+            (factor.path, name): found for (factor, name), found in zip(asked, ranks, strict=True)
+        }
         found = pool.map(partial(_rows_of, analysis), MEASURES)
         for measure, rows in zip(MEASURES, each(found, len(MEASURES)), strict=True):
             _add(analysis, measure, rows, groups)
@@ -361,9 +331,9 @@ def analysed(sweep: Sweep, by: str = BEST_BY) -> Analysis:
     ]
     analysis.tables['quantiles'] = [row for name in figures for row in analysis.spreads[name]]
     analysis.pair = analysis.most_influential()[:2]
-    _pairs(analysis)
-    _failures(analysis)
-    analysis.tables['best'] = best(sweep, analysis.values, BY_NAME[by])
+    analysis.tables['together'] = [*together(analysis)]
+    analysis.tables['failures'] = [*failures(analysis)]
+    analysis.tables['best'] = best(analysis, BY_NAME[by])
     return analysis
 
 
@@ -384,27 +354,35 @@ def _tied(sweep: Sweep) -> Iterator[str]:
             yield f'{names} vary side by side: what one explains may be the work of another'
 
 
+def _ranks_of(sweep: Sweep, asked: tuple[Factor, str]) -> np.ndarray | None:
+    factor, controller = asked
+    if factor.numbers is None:
+        return None
+    return Ordered.of(factor.numbers[sweep.finished[controller]]).ranks
+
+
 def _rows_of(analysis: Analysis, measure: Measure) -> list[tuple[str, Row]] | None:
     """Rows of a measure with the tables that they are of; None where it does not vary."""
     sweep = analysis.sweep
     columns = _columns(sweep, measure.columns)
     values = analysis.values[measure.name] = measure.of(columns.__getitem__)
     _spreads(analysis, columns | {measure.name: values})  # while they are at hand
-    ok = [analysis.rows_of(name) for name in sweep.controllers]
-    if not varying([values[rows] for rows in ok], measure.unit):
+    finished = sweep.finished
+    if not varying([values[rows] for rows in finished.values()], measure.unit):
         return None
     found = [('paired', row) for row in pairs(sweep, values, measure)]
-    for controller, rows in zip(sweep.controllers, ok, strict=True):
+    for controller, rows in finished.items():
         figure = Ordered.of(values[rows], measure.unit)
-        names = {'controller': controller, 'figure': measure.name}
-        for factor in analysis.factors:
-            if not (factor.differs and factor.concerns(controller)):
-                continue
-            codes = factor.codes[rows]
-            for row in along(figure, codes, factor, measure):
-                found.append(('dependence', {'controller': controller} | row))
-            if shares := _influence(analysis, figure, factor, codes, controller):
-                found.append(('influence', names | {'path': factor.path} | shares))
+        there = ~np.isnan(figure.ranks)
+        for factor in analysis.varied(controller):
+            codes, others = factor.codes[rows], analysis.ranks[factor.path, controller]
+            rising = along(controller, figure, codes, factor, measure)
+            found += [('dependence', row) for row in rising]
+            if others is not None and not there.all():
+                others = Ordered.of(others[there]).ranks
+            if shares := influence(figure.ranks[there], codes[there], others):
+                names = {'controller': controller, 'figure': measure.name, 'path': factor.path}
+                found.append(('influence', names | shares))
     return found
 
 
@@ -426,41 +404,6 @@ def _add(
         analysis.tables['indices'] += indices(sweep, group, values, measure)
         lacking = omitted(sweep, group, values, measure)
         analysis.notes += [note for note in lacking if note not in analysis.notes]
-
-
-def _influence(
-    analysis: Analysis, figure: Ordered, factor: Factor, codes: np.ndarray, controller: str
-) -> Row | None:
-    there = ~np.isnan(figure.ranks)
-    if there.all():
-        return influence(figure.ranks, codes, analysis.ranks_of(factor, controller))
-    rows, numbers = analysis.rows_of(controller)[there], factor.numbers
-    others = None if numbers is None else Ordered.of(numbers[rows]).ranks
-    return influence(figure.ranks[there], codes[there], others)
-
-
-def _pairs(analysis: Analysis) -> None:
-    if len(analysis.pair) < 2:
-        return
-    for measure in analysis.measures:
-        for controller in analysis.sweep.controllers:
-            if all(factor.concerns(controller) for factor in analysis.pair):
-                rows = analysis.rows_of(controller)
-                values = analysis.values[measure.name]
-                for row in together(values, rows, analysis.pair, measure):
-                    analysis.tables['together'].append({'controller': controller} | row)
-
-
-def _failures(analysis: Analysis) -> None:
-    sweep = analysis.sweep
-    if not (sweep.status != 0).any():
-        return
-    for i, controller in enumerate(sweep.controllers):
-        rows = np.flatnonzero(sweep.controller == i)
-        for factor in analysis.factors:
-            if factor.differs and factor.concerns(controller):
-                for row in failures(factor, sweep.status, rows):
-                    analysis.tables['failures'].append({'controller': controller} | row)
 
 
 def results_of(analysis: Analysis) -> Results:

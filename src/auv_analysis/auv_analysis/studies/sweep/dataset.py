@@ -98,6 +98,15 @@ class Sweep:
         """Place of the status of each row in `STATUSES` (n,)."""
         return self._place('status', STATUSES)
 
+    @cached_property
+    def finished(self) -> dict[str, np.ndarray]:
+        """Controller -> indices of its rows that have figures."""
+        ok = self.status == 0
+        return {
+            name: np.flatnonzero(ok & (self.controller == i))
+            for i, name in enumerate(self.controllers)
+        }
+
     def _place(self, column: str, words: Sequence[str]) -> np.ndarray:
         found = pc.index_in(self.table([column])[column], value_set=pa.array(words))
         if found.null_count:

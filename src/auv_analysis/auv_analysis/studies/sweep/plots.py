@@ -77,7 +77,7 @@ def _distributions(analysis: Analysis) -> Drawn:
     figure, panels = plots.small_multiples(len(measures), 4, height=1.75, sharey=True)
     for axes, measure in zip(panels, measures, strict=True):
         values = ordered(analysis.values[measure.name], measure.unit)
-        samples = {name: thinned(values[analysis.rows_of(name)]) for name in controllers}
+        samples = {name: thinned(values[analysis.sweep.finished[name]]) for name in controllers}
         plots.distribution(axes, samples, looks)
         _logarithmic(axes, 'x', np.concatenate(list(samples.values())))
         _head(axes, measure)
@@ -219,7 +219,7 @@ def _dependence(analysis: Analysis, factor: Factor, measures: Sequence[Measure])
                     if (r['controller'], r['path'], r['figure']) == mine]  # fmt: skip
             style = look(every.index(controller)) | {'label': controller}
             if factor.binned and factor.numbers is not None:
-                sample = analysis.rows_of(controller)
+                sample = analysis.sweep.finished[controller]
                 sample = sample[:: max(len(sample) // SAMPLE, 1)][:SAMPLE]
                 values = analysis.values[measure.name][sample]
                 axes.plot(factor.numbers[sample], values, '.', color=style['color'], alpha=0.35,

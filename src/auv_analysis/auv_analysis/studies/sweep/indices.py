@@ -13,13 +13,12 @@ from auv_analysis.output.new_files import known
 from auv_analysis.studies.sweep.dataset import Sweep
 from auv_analysis.studies.sweep.variation import (
     LEVELS,
-    Drawn,
     Group,
-    Saltelli,
     cube,
     kind_of,
     make_group,
     morris,
+    saltelli,
 )
 
 Row = dict[str, Any]
@@ -93,8 +92,8 @@ def _designed(sweep: Sweep, groups: list[Group], number: int, spec: dict[str, An
     kind = kind_of(spec)
     paths = list(spec[kind])
     points = None
-    if kind == 'morris' and isinstance(group, Drawn):
-        points = group.design.at(np.arange(group.size))
+    if kind == 'morris' and group.plan is not None:
+        points = group.plan.at(np.arange(group.size))
     step = sizes[number] // int(spec['count'])
     others = outer * inner + sweep.index % inner
     cases = _cases(sweep, others, paths, sweep.manifest['rollouts'] // sizes[number])
@@ -288,8 +287,8 @@ Method = Literal['sobol', 'morris']
 BOOTSTRAPS = 1000  # of the confidence of a spread
 CONFIDENCE = 0.95
 NAMES = {
-    'sobol': ('S1', 'S1_conf', 'ST', 'ST_conf'),
-    'morris': ('mu_star', 'mu_star_conf', 'sigma'),
+    'sobol': FIRST_AND_TOTAL,
+    'morris': EFFECTS[1:],
 }
 
 
@@ -335,7 +334,7 @@ class SensitivityPlan:
 
     @cached_property
     def _unit(self) -> np.ndarray:
-        make = Saltelli if self.method == 'sobol' else morris
+        make = saltelli if self.method == 'sobol' else morris
         design = make(self.names, {'count': self.count}, self.seed + 1)
         return design.at(np.arange(design.size))
 
@@ -390,6 +389,8 @@ def spreads(design: SensitivityPlan, answers: np.ndarray) -> dict[str, np.ndarra
         and half of it; rank, rank_low, rank_high, place among the F answers, 1 the largest
 
     """
+    from scipy.stats import rankdata
+
     groups = answers[design.independent]  # (count, m, F)
     centred = groups - groups.mean(axis=(0, 1))
     size, rng = groups.shape[1], np.random.default_rng(design.seed)
@@ -399,10 +400,10 @@ def spreads(design: SensitivityPlan, answers: np.ndarray) -> dict[str, np.ndarra
     )
     tail = 50.0 * (1.0 - CONFIDENCE)
     low, high = np.percentile(again, [tail, 100.0 - tail], axis=0)
-    places = _ranks(again)
+    places = rankdata(-again, 'ordinal', axis=1)
     ends = np.percentile(places, [tail, 100.0 - tail], axis=0, method='nearest')
     found = {'spread': value[0], 'spread_low': low, 'spread_high': high}
-    found |= {'spread_conf': 0.5 * (high - low), 'rank': _ranks(value)[0]}
+    found |= {'spread_conf': 0.5 * (high - low), 'rank': rankdata(-value, 'ordinal', axis=1)[0]}
     return found | dict(zip(('rank_low', 'rank_high'), ends.astype(int), strict=True))
 
 
@@ -411,8 +412,3 @@ def _deviation(weights: np.ndarray, centred: np.ndarray, size: int) -> np.ndarra
     total = weights.sum(axis=1, keepdims=True) * size
     mean = weights @ centred.sum(axis=1) / total
     return np.sqrt(np.maximum(weights @ (centred**2).sum(axis=1) / total - mean**2, 0.0))
-
-
-def _ranks(values: np.ndarray) -> np.ndarray:
-    """Places (R, F) by falling value, from 1 on."""
-    return np.argsort(np.argsort(-values, axis=1, kind='stable'), axis=1, kind='stable') + 1

@@ -5,7 +5,7 @@ for before: any part of a sweep is had at the same cost.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -179,13 +179,18 @@ MOST_AT_ONCE = 10_000_000  # numbers of a design that is made as a whole: 80 MB
 Seed = np.random.SeedSequence | int
 
 
-class SamplingPlan(Protocol):
-    """Points of the unit cube."""
+class SamplingPlan(NamedTuple):
+    """Points of the unit cube.
 
-    size: int  # number of points
+    Attributes
+    ----------
+    size : number of points
+    at : positions (n,) below `size` -> points (n, k)
 
-    def at(self, positions: np.ndarray) -> np.ndarray:
-        """Points (n, k) at positions (n,) below `size`."""
+    """
+
+    size: int
+    at: Callable[[np.ndarray], np.ndarray]
 
 
 def make_design(
@@ -215,94 +220,76 @@ def _in_runs(positions: np.ndarray, draw: Callable[[int, int], np.ndarray]) -> n
     return np.concatenate([draw(int(run[0]), len(run)) for run in np.split(wanted, breaks)])[where]
 
 
-class Random:
+def random(
+    paths: Sequence[str], spec: dict[str, Any], seed: np.random.SeedSequence
+) -> SamplingPlan:
     """Independent uniform numbers: counter-based, so that any row is had at the same cost."""
+    key, width = seed.generate_state(2, np.uint64), len(paths)
+    blocks = -(-width // 4)  # of four words, which one count of Philox gives
 
-    def __init__(self, paths: list[str], spec: dict[str, Any], seed: np.random.SeedSequence):
-        self.size, self._width = spec['count'], len(paths)
-        self._key = seed.generate_state(2, np.uint64)
-
-    def at(self, positions: np.ndarray) -> np.ndarray:
-        """See `SamplingPlan`."""
-        return _in_runs(positions, self._draw)
-
-    def _draw(self, first: int, count: int) -> np.ndarray:
-        blocks = -(-self._width // 4)  # of four words, which one count of Philox gives
-        stream = np.random.Philox(key=self._key, counter=first * blocks)
-        words = stream.random_raw(count * blocks * 4).reshape(count, -1)[:, : self._width]
+    def draw(first: int, count: int) -> np.ndarray:
+        stream = np.random.Philox(key=key, counter=first * blocks)
+        words = stream.random_raw(count * blocks * 4).reshape(count, -1)[:, :width]
         return ((words >> np.uint64(11)) + 0.5) * 2.0**-53
 
+    return SamplingPlan(spec['count'], lambda positions: _in_runs(positions, draw))
 
-class Sobol:
-    """Scrambled Sobol' sequence."""
 
-    def __init__(
-        self, paths: Sequence[str], spec: dict[str, Any], seed: Seed, width: int | None = None
-    ):
-        from scipy.stats import qmc
+def sobol(
+    paths: Sequence[str], spec: dict[str, Any], seed: Seed, width: int | None = None
+) -> SamplingPlan:
+    """Scrambled Sobol' sequence; going forward costs least."""
+    from scipy.stats import qmc
 
-        self.size, self._next = spec['count'], 0
-        width = width or len(paths)
-        if width > qmc.Sobol.MAXDIM:
-            raise ValueError(f'at most {qmc.Sobol.MAXDIM} coordinates', f'{width}')
-        self._sequence = qmc.Sobol(width, rng=np.random.default_rng(seed))
+    width = width or len(paths)
+    if width > qmc.Sobol.MAXDIM:
+        raise ValueError(f'at most {qmc.Sobol.MAXDIM} coordinates', f'{width}')
+    sequence = qmc.Sobol(width, rng=np.random.default_rng(seed))
 
-    def at(self, positions: np.ndarray) -> np.ndarray:
-        """See `SamplingPlan`; going forward costs least."""
-        return _in_runs(positions, self._draw)
-
-    def _draw(self, first: int, count: int) -> np.ndarray:
-        if first < self._next:
-            self._sequence.reset()
-            self._next = 0
-        if first > self._next:
-            self._sequence.fast_forward(first - self._next)
-        self._next = first + count
+    def draw(first: int, count: int) -> np.ndarray:
+        if first < sequence.num_generated:
+            sequence.reset()
+        if first > sequence.num_generated:
+            sequence.fast_forward(first - sequence.num_generated)
         if first == 0 and count > 1:  # what is not a power of two is warned of at the first draw
-            return np.concatenate([self._sequence.random(1), self._sequence.random(count - 1)])
-        return self._sequence.random(count)
+            return np.concatenate([sequence.random(1), sequence.random(count - 1)])
+        return np.asarray(sequence.random(count))
+
+    return SamplingPlan(spec['count'], lambda positions: _in_runs(positions, draw))
 
 
-class Saltelli:
+def saltelli(paths: Sequence[str], spec: dict[str, Any], seed: Seed) -> SamplingPlan:
     """Rows A, A with a column of B each, (B with a column of A each,) B: as SALib.sample.sobol."""
+    k = len(paths)
+    rows = (2 if spec.get('second_order') else 1) * k + 2
+    base = sobol(paths, spec, seed, 2 * k)
 
-    def __init__(self, paths: Sequence[str], spec: dict[str, Any], seed: Seed):
-        self._width = len(paths)
-        self._rows = (2 if spec.get('second_order') else 1) * self._width + 2
-        self._base = Sobol(paths, spec, seed, 2 * self._width)
-        self.size = spec['count'] * self._rows
-
-    def at(self, positions: np.ndarray) -> np.ndarray:
-        """See `SamplingPlan`."""
-        k = self._width
-        point, row = np.divmod(positions, self._rows)
-        A, B = np.split(self._base.at(point), 2, axis=1)
+    def at(positions: np.ndarray) -> np.ndarray:
+        point, row = np.divmod(positions, rows)
+        A, B = np.split(base.at(point), 2, axis=1)
         mixed = np.where((row <= k)[:, None], A, B)
         # the last row is B itself: no column is taken from A
-        column = np.where(row == self._rows - 1, -1, np.where(row <= k, row - 1, row - k - 1))
+        column = np.where(row == rows - 1, -1, np.where(row <= k, row - 1, row - k - 1))
         other = np.where((row <= k)[:, None], B, A)
         return np.where(np.arange(k) == column[:, None], other, mixed)
 
+    return SamplingPlan(spec['count'] * rows, at)
 
-class AtOnce:
+
+def _at_once(size: int, width: int, make: Callable[[], np.ndarray]) -> SamplingPlan:
     """A design that is made as a whole."""
-
-    def __init__(self, size: int, width: int, make: Callable[[], np.ndarray]):
-        if size * width > MOST_AT_ONCE:
-            expected = f'at most {MOST_AT_ONCE // width} points of {width} values: made as a whole'
-            raise ValueError(expected, f'{size}; random, sobol and saltelli have no such limit')
-        self.size, self._points = size, make()
-
-    def at(self, positions: np.ndarray) -> np.ndarray:
-        """See `SamplingPlan`."""
-        return self._points[positions]
+    if size * width > MOST_AT_ONCE:
+        expected = f'at most {MOST_AT_ONCE // width} points of {width} values: made as a whole'
+        raise ValueError(expected, f'{size}; random, sobol and saltelli have no such limit')
+    points = make()
+    return SamplingPlan(size, lambda positions: points[positions])
 
 
 def _latin_hypercube(paths: list[str], spec: dict[str, Any], seed: Seed) -> SamplingPlan:
     from scipy.stats import qmc
 
     sampler = qmc.LatinHypercube(len(paths), rng=np.random.default_rng(seed))
-    return AtOnce(spec['count'], len(paths), lambda: sampler.random(spec['count']))
+    return _at_once(spec['count'], len(paths), lambda: sampler.random(spec['count']))
 
 
 def morris(paths: Sequence[str], spec: dict[str, Any], seed: Seed) -> SamplingPlan:
@@ -311,7 +298,7 @@ def morris(paths: Sequence[str], spec: dict[str, Any], seed: Seed) -> SamplingPl
 
     number = seed if isinstance(seed, int) else int(seed.generate_state(1)[0])
     levels = spec.get('levels', LEVELS)
-    return AtOnce(
+    return _at_once(
         spec['count'] * (len(paths) + 1),
         len(paths),
         lambda: morris.sample(cube(paths), spec['count'], num_levels=levels, seed=number),
@@ -324,67 +311,63 @@ def cube(names: Sequence[str]) -> dict[str, Any]:
 
 
 DESIGNS: dict[str, Callable[[list[str], dict[str, Any], np.random.SeedSequence], SamplingPlan]] = {
-    'random': Random,
-    'sobol': Sobol,
-    'saltelli': Saltelli,
+    'random': random,
+    'sobol': sobol,
+    'saltelli': saltelli,
     'latin_hypercube': _latin_hypercube,
     'morris': morris,
 }
 
 
-class Group(Protocol):
-    """What varies together."""
+class Group(NamedTuple):
+    """What varies together.
 
-    size: int  # number of combinations
+    Attributes
+    ----------
+    size : number of combinations
+    at : positions (n,) below `size` -> path -> n values
+    plan : whose coordinates its distributions go along; None of listed values
 
-    def at(self, positions: np.ndarray) -> dict[str, Values]:
-        """Path -> n values at positions (n,) below `size`."""
+    """
+
+    size: int
+    at: Callable[[np.ndarray], dict[str, Values]]
+    plan: SamplingPlan | None = None
 
 
-class FullFactorial:
+def _full_factorial(axes: dict[str, Values]) -> Group:
     """Every combination of listed values; the last path runs fastest."""
 
-    def __init__(self, axes: dict[str, Values]):
-        self._axes = axes
-        self.size = int(np.prod([len(values) for values in axes.values()], dtype=object))
-
-    def at(self, positions: np.ndarray) -> dict[str, Values]:
-        """See `Group`."""
+    def at(positions: np.ndarray) -> dict[str, Values]:
         found: dict[str, Values] = {}
-        for path in reversed(self._axes):
-            values = self._axes[path]
+        for path in reversed(axes):
+            values = axes[path]
             found[path] = take(values, positions % len(values))
             positions = positions // len(values)
-        return {path: found[path] for path in self._axes}
+        return {path: found[path] for path in axes}
+
+    return Group(int(np.prod([len(values) for values in axes.values()], dtype=object)), at)
 
 
-class Zip:
+def _zip(axes: dict[str, Values]) -> Group:
     """Listed values side by side, all of one length."""
-
-    def __init__(self, axes: Mapping[str, Values]):
-        lengths = {path: len(values) for path, values in axes.items()}
-        if len(set(lengths.values())) > 1:
-            found = ', '.join(f'{length} of {path}' for path, length in lengths.items())
-            raise ValueError('as many values of each path', found)
-        self._axes, self.size = axes, next(iter(lengths.values()))
-
-    def at(self, positions: np.ndarray) -> dict[str, Values]:
-        """See `Group`."""
-        return {path: take(values, positions) for path, values in self._axes.items()}
+    lengths = {path: len(values) for path, values in axes.items()}
+    if len(set(lengths.values())) > 1:
+        found = ', '.join(f'{length} of {path}' for path, length in lengths.items())
+        raise ValueError('as many values of each path', found)
+    size = next(iter(lengths.values()))
+    return Group(size, lambda at: {path: take(values, at) for path, values in axes.items()})
 
 
-class Drawn:
+def _drawn(distributions: dict[str, Distribution], plan: SamplingPlan) -> Group:
     """Distributions along the coordinates of a design of the unit cube."""
 
-    def __init__(
-        self, quantiles: Mapping[str, Callable[[np.ndarray], Values]], design: SamplingPlan
-    ):
-        self._quantiles, self.design, self.size = quantiles, design, design.size
+    def at(positions: np.ndarray) -> dict[str, Values]:
+        points = plan.at(positions)
+        columns = zip(distributions.items(), points.T, strict=True)
+        return {path: one.quantile(column) for (path, one), column in columns}
 
-    def at(self, positions: np.ndarray) -> dict[str, Values]:
-        """See `Group`."""
-        points = self.design.at(positions)
-        return {path: q(points[:, i]) for i, (path, q) in enumerate(self._quantiles.items())}
+    return Group(plan.size, at, plan)
 
 
 def kind_of(spec: Mapping[str, Any]) -> str:
@@ -411,13 +394,12 @@ def make_group(spec: Mapping[str, Any], seed: int, number: int, file: object) ->
     try:
         if kind in ('grid', 'zip'):
             axes = _each(spec[kind], axis_values, place, file)
-            return FullFactorial(axes) if kind == 'grid' else Zip(axes)
+            return _full_factorial(axes) if kind == 'grid' else _zip(axes)
         drawn = _each(spec[kind], make_distribution, place, file)
         if kind == 'morris':
             _check_bounded(drawn, place, file)
         options = {key: int(value) for key, value in spec.items() if key != kind}  # 4.0 is 4
-        design = make_design(kind, list(drawn), options, seed, number)
-        return Drawn({path: entry.quantile for path, entry in drawn.items()}, design)
+        return _drawn(drawn, make_design(kind, list(drawn), options, seed, number))
     except InputError:
         raise
     except ValueError as error:

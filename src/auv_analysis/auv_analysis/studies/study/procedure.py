@@ -77,8 +77,8 @@ def _stored(of: Sensitivity) -> Iterator[Row]:
     about |= {'span_asked': of.asked, 'diverged': sum(of.failed.values()), 'seed': of.seed}
     rows: list[Row] = [*of.rows]
     rows += [
-        {'figure': e.kpi.name, 'dof': e.kpi.dof, 'unit': e.kpi.quantity.unit, 'reason': e.reason}
-        for e in of.excluded
+        {'figure': kpi.name, 'dof': kpi.dof, 'unit': kpi.quantity.unit, 'reason': reason}
+        for kpi, reason in of.excluded.items()
     ]
     rows += [{'reason': of.refusal}] if of.refusal else []
     for row in rows:
@@ -145,7 +145,7 @@ def _left_out(of: Sensitivity) -> Iterator[tuple[str, str]]:
     if of.refusal:
         yield 'all KPIs', of.refusal
     yield from ((f'gain {gain}', reason) for gain, reason in of.left_out.items())
-    yield from ((entry.kpi.quantity.label, entry.reason) for entry in of.excluded)
+    yield from ((kpi.quantity.label, reason) for kpi, reason in of.excluded.items())
 
 
 def sensitivity_sentences(found: Sequence[Sensitivity]) -> list[Sentence]:

@@ -5,7 +5,7 @@ logarithms of the KPIs.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ SIX = (
     'coupling.delta_xi_max', 'coupling.delta_pi_max', 'kinetic_energy.shares_percent',
 )  # fmt: skip
 TOTAL = 'kinetic_energy.mean'
+STRUCTURAL = 'zero for every motion by the structure of M'
 ROUNDING = 1e-9  # of the largest of its kind, and of a relative change: below it is no signal
 
 
@@ -59,18 +60,10 @@ class Kpi:
         return quantity(self.column)
 
 
-@dataclass(frozen=True)
-class Excluded:
-    """A KPI that has no sensitivity, and why."""
-
-    kpi: Kpi
-    reason: str
-
-
 KPIS = (*(Kpi(name, dof) for name in SIX for dof in DOFS), Kpi(TOTAL, 'all'))
 
 
-def sort_out(found: Mapping[str, np.ndarray], vehicle: Vehicle) -> tuple[list[Kpi], list[Excluded]]:
+def sort_out(found: Mapping[str, np.ndarray], vehicle: Vehicle) -> tuple[list[Kpi], dict[Kpi, str]]:
     """KPIs whose logarithm is defined and changes, and the others with the reason.
 
     Parameters
@@ -80,21 +73,10 @@ def sort_out(found: Mapping[str, np.ndarray], vehicle: Vehicle) -> tuple[list[Kp
 
     """
     zeros = structural_zeros(control_model(vehicle).Upsilon.reshape(6, 6))
-    kept, excluded = [], []
-    for kpi in KPIS:
-        reason = _structural(kpi, zeros) or _reason(kpi, found)
-        if reason:
-            excluded.append(Excluded(kpi, reason))
-        else:
-            kept.append(kpi)
-    return kept, excluded
-
-
-def _structural(kpi: Kpi, zeros: Mapping[str, list[str]]) -> str:
-    for kind, dofs in zeros.items():
-        if kpi.name == f'coupling.{kind}_max' and kpi.dof in dofs:
-            return 'zero for every motion by the structure of M'
-    return ''
+    never = {Kpi(f'coupling.{kind}_max', dof) for kind, dofs in zeros.items() for dof in dofs}
+    reasons = {kpi: STRUCTURAL if kpi in never else _reason(kpi, found) for kpi in KPIS}
+    excluded = {kpi: reason for kpi, reason in reasons.items() if reason}
+    return [kpi for kpi in KPIS if kpi not in excluded], excluded
 
 
 def _reason(kpi: Kpi, found: Mapping[str, np.ndarray]) -> str:
@@ -152,7 +134,7 @@ class Sensitivity:
             squares; doubled : change in % when the gain is doubled, by that
         S1, ST, mu_star, sigma : indices of ln(KPI), see `SensitivityPlan.indices`; '_conf' is
             half of the 95 % interval; absent what the method does not give
-    excluded : KPIs that have no spread, and why
+    excluded : KPI without spread -> why
     refusal : why there are no rows; empty where there are
 
     """
@@ -169,7 +151,7 @@ class Sensitivity:
     gains: tuple[str, ...]
     left_out: Mapping[str, str]
     rows: tuple[Row, ...] = ()
-    excluded: tuple[Excluded, ...] = ()
+    excluded: Mapping[Kpi, str] = field(default_factory=dict)
     refusal: str = ''
 
     @property
@@ -195,54 +177,21 @@ class Sensitivity:
         return np.array([found[dof][0]['spread'] if dof in found else 0.0 for dof in DOFS])
 
 
-@dataclass(frozen=True)
-class GainFactors:
-    """What of a controller is multiplied.
-
-    Attributes
-    ----------
-    scenario : the same with every default gain of the controller written out
-    controller : its name
-    values : gain -> what the scenario gives: one number, (6,) or (6, 6)
-    left_out : gain -> why it is no factor
-
-    """
-
-    scenario: Scenario
-    controller: str
-    values: Mapping[str, np.ndarray]
-    left_out: Mapping[str, str]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the gains that are multiplied."""
-        return tuple(self.values)
-
-    def changes(self, factors: np.ndarray) -> dict[str, np.ndarray]:
-        """Changes for `rollouts`.
-
-        Parameters
-        ----------
-        factors : (B, k) positive, a column per gain
-
-        Returns
-        -------
-        changes : path -> (B, ...) gains
-
-        """
-        return {
-            gain_path(self.controller, name): np.multiply.outer(factors[:, i], value)
-            for i, (name, value) in enumerate(self.values.items())
-        }
-
-
 def gain_path(controller: str, gain: str) -> str:
     """Path of a gain; a controller's name may have dots in it."""
     return f"controllers.'{controller}'.{gain}"
 
 
-def gain_factors(scenario: Scenario, controller: str) -> GainFactors:
+def gain_factors(
+    scenario: Scenario, controller: str
+) -> tuple[Scenario, dict[str, np.ndarray], dict[str, str]]:
     """Every gain of a controller's law that is not zero, those left to their defaults as well.
+
+    Returns
+    -------
+    scenario : the same with every default gain of the controller written out
+    values : gain -> what the scenario gives: one number, (6,) or (6, 6)
+    left_out : gain -> why it is no factor
 
     Raises
     ------
@@ -250,7 +199,7 @@ def gain_factors(scenario: Scenario, controller: str) -> GainFactors:
 
     """
     if scenario.controller(controller)['law'] == OPEN_LOOP:  # its numbers are those of a wrench
-        return GainFactors(scenario, controller, {}, {})
+        return scenario, {}, {}
     given: dict[str, Any] = scenario.gain_values(controller)
     law = type(scenario.gains(controller))
     defaults = getattr(law, '_field_defaults', {})
@@ -261,7 +210,7 @@ def gain_factors(scenario: Scenario, controller: str) -> GainFactors:
         scenario = changed_scenario(scenario, written)
     moved = {name: values[name] for name in law._fields if np.any(values[name] != 0.0)}
     still = {name: 'zero: a factor leaves it as it is' for name in values if name not in moved}
-    return GainFactors(scenario, controller, moved, still)
+    return scenario, moved, still
 
 
 def sensitivity(
@@ -302,20 +251,25 @@ def sensitivity(
     """
     if not span > 1.0:
         raise ValueError(f'span: expected a number above 1, found {span}')
-    factors = gain_factors(scenario, controller)
+    scenario, gains, left_out = gain_factors(scenario, controller)
     law = scenario.controller(controller)['law']
     open_ = method is None or count is None
-    slow = bool(factors.names) and open_ and _in_python(scenario, controller, hold)
+    slow = bool(gains) and open_ and _in_python(scenario, controller, hold)
     method = method or ('morris' if slow else 'sobol')
     count = count or _default_count(law, method, slow=slow)
-    result = Sensitivity(
-        controller, law, method, count, seed, 0, span, span, {}, factors.names, factors.left_out
-    )
-    if not factors.names:
+    names = tuple(gains)
+    result = Sensitivity(controller, law, method, count, seed, 0, span, span, {}, names, left_out)
+    if not names:
         return replace(result, refusal='the law has no gain that is not zero')
-    design = SensitivityPlan(method, factors.names, count, seed)
+    design = SensitivityPlan(method, names, count, seed)
     for used in (span ** (0.5**i) for i in range(SHRINKS)):
-        found = _rollouts(factors, used**design.points, hold, threads)
+        # with the gains as they are in the first row, then those of the design
+        rows = np.vstack([np.ones(len(names)), used**design.points])
+        changes = {
+            gain_path(controller, name): np.multiply.outer(factor, value)
+            for factor, (name, value) in zip(rows.T, gains.items(), strict=True)
+        }
+        found = rollouts(scenario, controller, changes, hold=hold, threads=threads)
         failed = int(np.sum(found['status'] != 'ok'))
         if failed:
             result = replace(result, failed={**result.failed, used: failed})
@@ -323,8 +277,10 @@ def sensitivity(
             reason = f'with the scenario’s own gains: {found["reason"][0]}'
             return replace(result, failed={}, refusal=reason)
         if not failed:
-            return _judged(replace(result, span=used), design, found, factors)
-    return replace(result, span=used, refusal=_refusal(result, found))
+            return _judged(replace(result, span=used), design, found, scenario.vehicle)
+    spans = ', '.join(f'{n} within a factor {span:.3g}' for span, n in result.failed.items())
+    first = next(reason for reason in found['reason'] if reason)
+    return replace(result, span=used, refusal=f'rollouts that failed: {spans}; the first: {first}')
 
 
 def _in_python(scenario: Scenario, controller: str, hold: Hold) -> bool:
@@ -342,28 +298,13 @@ def _default_count(law: str, method: Method, *, slow: bool) -> int:
     return (COUNTS if law in SHIPPED else OWN_COUNTS).get(method, 0)
 
 
-def _rollouts(
-    factors: GainFactors, points: np.ndarray, hold: Hold, threads: int
-) -> dict[str, np.ndarray]:
-    """Figures with the gains as they are in the first row, then those of the design."""
-    rows = np.vstack([np.ones(len(factors.names)), points])
-    changes = factors.changes(rows)
-    return rollouts(factors.scenario, factors.controller, changes, hold=hold, threads=threads)
-
-
-def _refusal(result: Sensitivity, found: Mapping[str, np.ndarray]) -> str:
-    spans = ', '.join(f'{n} within a factor {span:.3g}' for span, n in result.failed.items())
-    first = next(reason for reason in found['reason'] if reason)
-    return f'rollouts that failed: {spans}; the first: {first}'
-
-
 def _judged(
     result: Sensitivity,
     design: SensitivityPlan,
     found: Mapping[str, np.ndarray],
-    factors: GainFactors,
+    vehicle: Vehicle,
 ) -> Sensitivity:
-    kpis, excluded = sort_out({k: v[1:] for k, v in found.items()}, factors.scenario.vehicle)
+    kpis, excluded = sort_out({k: v[1:] for k, v in found.items()}, vehicle)
     rows: list[Row] = []
     for name in dict.fromkeys(kpi.name for kpi in kpis):
         alike = [kpi for kpi in kpis if kpi.name == name]  # among which they are ranked
@@ -383,4 +324,4 @@ def _judged(
     plain = [{k: v.item() if hasattr(v, 'item') else v for k, v in row.items()} for row in rows]
     plain.sort(key=lambda row: -row['spread'])
     count = len(design.points) + 1
-    return replace(result, rollouts=count, rows=tuple(plain), excluded=tuple(excluded))
+    return replace(result, rollouts=count, rows=tuple(plain), excluded=excluded)

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from auv_dynamics.files.shipped import shipped, shipped_names
-from auv_dynamics.files.yaml_files import read_yaml, yaml_text
+from auv_dynamics.files.shipped import shipped
+from auv_dynamics.files.yaml_files import read_yaml
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
 REFERENCE = 'herman2018'  # the vehicle that case1 was made for
@@ -33,19 +33,6 @@ TOP_SPEED = {
     'lauv': '2 m/s (as the model of gym-auv limits it)',
     'lrauv_tethys': '1.0 m/s (MBARI)',
 }
-COMMENT = """\
-# yaml-language-server: $schema=../../src/auv_dynamics/auv_dynamics/plant/scenario.schema.json
-#
-# Case 1 of Herman 2018 on {name}: what do the paper's gains do on another vehicle?
-# Kept from case1: controllers with their gains, duration, step.
-# Set-point (35) times {factor}: at most {surge:g} m/s in surge, {heave:g} m/s in heave and
-# {yaw:g} rad/s in yaw, for every shipped vehicle. Top speed of this one: {speed}.
-# All six degrees of freedom count as actuated, as in the paper. A torpedo-shaped vehicle has
-# nothing to heave with: there it is an experiment on paper.
-# Disturbance (39): the same acceleration a(t) for every vehicle, F = M a(t).
-{scale}
-# Written by write_scaled_scenarios in scenario/scaling.py; a test holds the two together.
-"""
 
 
 def scaled_case1(vehicle: str | Path) -> dict[str, Any]:
@@ -106,41 +93,3 @@ def _slower(harmonics: dict[str, Any]) -> dict[str, Any]:
 def _rounded(A: np.ndarray) -> np.ndarray:
     A = np.where(np.abs(A) < ROUNDING * np.abs(A).max(), 0.0, A)
     return np.array([[float(f'{entry:.{DIGITS}g}') for entry in row] for row in A])
-
-
-def scenario_text(scenario: dict[str, Any]) -> str:
-    """Text of a scenario file of `scaled_case1`, with what was scaled in its comment."""
-    name = Path(scenario['vehicle']).stem
-    comment = COMMENT.format(
-        name=name,
-        factor=SLOWER,
-        scale='\n'.join(f'# {line}' for line in SCALE),
-        speed=TOP_SPEED.get(name, 'not found in its sources'),
-        **{dof: round(_peak(harmonics), 6) for dof, harmonics in scenario['setpoint'].items()},
-    )
-    return comment + yaml_text(scenario, width=200)
-
-
-def _peak(harmonics: dict[str, Any]) -> float:
-    """Bound of a harmonic of (35): offset plus all amplitudes, none of which is negative."""
-    return harmonics.get('offset', 0.0) + sum(term['amplitude'] for term in harmonics['terms'])
-
-
-def write_scaled_scenarios(folder: Path) -> list[Path]:
-    """Write case1 for each shipped vehicle but the paper's own; same input, same bytes.
-
-    Parameters
-    ----------
-    folder : existing; for the shipped ones, the folder of `shipped('scenarios', 'case1')`
-
-    Returns
-    -------
-    paths : of the files, in the order of their names
-
-    """
-    paths = []
-    for name in shipped_names('vehicles'):
-        if name != REFERENCE:
-            paths.append(folder / f'case1_{name}.yaml')
-            paths[-1].write_text(scenario_text(scaled_case1(name)), encoding='utf-8')
-    return paths

@@ -250,11 +250,10 @@ def test_each_coefficient_of_a_vehicle_file_has_its_line() -> None:
 
 def _chart(name: str, strength: float, pairs, failure: str = '') -> Made:
     zeros = {'delta_xi': ['yaw'], 'delta_pi': ['surge', 'sway'] if pairs else list('abcdef')}
-    couplings = Made(
+    return Made(
         name=name, is_diagonal=not pairs, strength=strength, largest=strength / 2, pairs=pairs,
-        zeros=zeros, damped=[('sway', 'yaw')] if pairs else [],
+        zeros=zeros, damped=[('sway', 'yaw')] if pairs else [], reached={'failure': failure},
     )  # fmt: skip
-    return Made(name=name, couplings=couplings, reached={'failure': failure})
 
 
 def test_findings_of_an_atlas() -> None:

@@ -31,7 +31,7 @@ def _chart(name: str, seed: int, *, diagonal: bool = False, failure: str = '') -
         * [kind != 'delta_pi', 1, 1, 1, 1, kind == 'delta_pi']
         for kind in ('delta_xi', 'delta_pi')
     }
-    return Made(name=name, couplings=couplings, reached=reached)
+    return Made(**vars(couplings), name=name, reached=reached)
 
 
 def test_an_atlas(tmp_path) -> None:
@@ -50,16 +50,16 @@ def test_an_atlas(tmp_path) -> None:
     assert axes.get_xlabel().endswith('(%)')
     for k, chart in enumerate(coupled):
         bar, (x, y) = axes.patches[k], points(artists.lines(axes)[0])
-        assert bar.get_x() + bar.get_width() == pytest.approx(100 * chart.couplings.strength)
+        assert bar.get_x() + bar.get_width() == pytest.approx(100 * chart.strength)
         assert bar.get_y() + bar.get_height() / 2 == pytest.approx(k)
-        assert (x[k], y[k]) == (pytest.approx(100 * chart.couplings.largest), k)
+        assert (x[k], y[k]) == (pytest.approx(100 * chart.largest), k)
     assert [text.get_text() for text in axes.texts] == ['sway–roll'] * 3
     for name, label in (('correlation', 'inertial correlation'), ('shares', 'share of energy (%)')):
         panels = [axes for axes in figures[name].axes if axes.images]
         assert [axes.get_title(loc='left') for axes in panels] == ['a', 'b', 'c']
         assert panels[0].images[0].colorbar.ax.get_xlabel() == label
         for axes, chart in zip(panels, coupled, strict=True):
-            found = chart.couplings
+            found = chart
             values = (
                 found.correlation
                 if name == 'correlation'
@@ -82,8 +82,8 @@ def test_an_atlas(tmp_path) -> None:
 
 def test_shares_however_small_are_on_a_scale_of_a_decade() -> None:
     chart = _chart('weak', 1)
-    chart.couplings.velocity_shares *= 1e-7
-    chart.couplings.input_shares *= 1e-7
+    chart.velocity_shares *= 1e-7
+    chart.input_shares *= 1e-7
     figure, *_ = atlas._shares([chart])
     assert figure.axes[0].images[0].get_clim() == (0.001, 0.01)
 

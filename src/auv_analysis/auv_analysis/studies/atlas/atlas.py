@@ -1,7 +1,7 @@
 """How strongly the inertia of vehicles couples their degrees of freedom, without units."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -100,8 +100,8 @@ Pair = tuple[str, str]
 
 
 @dataclass(frozen=True, eq=False)
-class Couplings:
-    """Couplings of a vehicle by its inertia.
+class Chart:
+    """Couplings of a vehicle by its inertia, and what they reach in case 1.
 
     Attributes
     ----------
@@ -113,6 +113,7 @@ class Couplings:
     strength : of `coupling_strength`
     zeros : 'delta_xi' and 'delta_pi' -> degrees of freedom that vanish for every motion
     damped : pairs that damping or lift couples
+    reached : of `reached`; empty where nobody has looked
 
     """
 
@@ -128,6 +129,7 @@ class Couplings:
     strength: float
     zeros: dict[str, list[str]]
     damped: list[Pair]
+    reached: dict[str, Any] = field(default_factory=dict)
 
     @property
     def is_diagonal(self) -> bool:
@@ -167,13 +169,13 @@ class Couplings:
         }
 
 
-def couplings_of(vehicle: Vehicle, name: str) -> Couplings:
+def couplings_of(vehicle: Vehicle, name: str) -> Chart:
     """Couplings of a vehicle under a name."""
     Upsilon, N = decompose(vehicle.M)
     inverse = inverse_upper(Upsilon)
     correlation = _without_rounding(inertial_correlation(vehicle.M))
     diagonal = not np.triu(correlation, 1).any()
-    return Couplings(
+    return Chart(
         name=name,
         source=vehicle.source or '',
         M=vehicle.M,
@@ -251,19 +253,6 @@ WHOLE = ('diagonal', 'strength_percent', 'largest_correlation_percent')
 PEAKS = ('delta_xi_max', 'delta_pi_max', 'delta_xi_energy_percent')
 
 
-@dataclass(frozen=True, eq=False)
-class Chart:
-    """One vehicle of the atlas: its couplings, and what they reach in case 1."""
-
-    couplings: Couplings
-    reached: dict[str, Any]
-
-    @property
-    def name(self) -> str:
-        """Name of the vehicle."""
-        return self.couplings.name
-
-
 def charts(vehicles: Iterable[str]) -> list[Chart]:
     """Charts of vehicles, those that are coupled the most first.
 
@@ -281,13 +270,13 @@ def charts(vehicles: Iterable[str]) -> list[Chart]:
     names = numbered([vehicle.name for vehicle in loaded])
     known = [couplings_of(*pair) for pair in zip(loaded, names, strict=True)]
     pairs = each(zip(known, vehicles, strict=True), len(vehicles))
-    found = [Chart(couplings, reached(vehicle)) for couplings, vehicle in pairs]
-    return sorted(found, key=lambda chart: (-chart.couplings.strength, chart.name))
+    found = [replace(chart, reached=reached(vehicle)) for chart, vehicle in pairs]
+    return sorted(found, key=lambda chart: (-chart.strength, chart.name))
 
 
 def results_of(found: Sequence[Chart]) -> Results:
     """The atlas: vehicle -> its numbers, and a table with a row per vehicle and ordered pair."""
-    vehicles = {chart.name: chart.couplings.as_dict() | {'case1': chart.reached} for chart in found}
+    vehicles = {chart.name: chart.as_dict() | {'case1': chart.reached} for chart in found}
     results = Results('atlas', {'dofs': list(DOFS), 'vehicles': vehicles})
     rows = [row for name, entry in vehicles.items() for row in _rows(name, entry)]
     results.add('atlas', 'Couplings of ordered pairs of degrees of freedom', rows, {})

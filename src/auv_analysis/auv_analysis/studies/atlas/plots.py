@@ -53,11 +53,11 @@ def coupled(charts: Sequence[Chart]) -> list[tuple[str, Chart]]:
     """Charts that have couplings, once for vehicles of equal correlation, with their names."""
     found: list[tuple[list[str], Chart]] = []
     for chart in charts:
-        if chart.couplings.is_diagonal:
+        if chart.is_diagonal:
             continue
-        R = chart.couplings.correlation
+        R = chart.correlation
         for names, other in found:
-            if np.array_equal(other.couplings.correlation, R):
+            if np.array_equal(other.correlation, R):
                 names.append(chart.name)
                 break
         else:
@@ -67,7 +67,7 @@ def coupled(charts: Sequence[Chart]) -> list[tuple[str, Chart]]:
 
 def uncoupled(charts: Sequence[Chart]) -> str:
     """Sentence, behind a blank, that names the vehicles of diagonal M; '' where there is none."""
-    names = [chart.name for chart in charts if chart.couplings.is_diagonal]
+    names = [chart.name for chart in charts if chart.is_diagonal]
     if not names:
         return ''
     verb = 'has' if len(names) == 1 else 'have'
@@ -75,10 +75,10 @@ def uncoupled(charts: Sequence[Chart]) -> str:
 
 
 def _correlation(charts: Sequence[Chart]) -> Drawn:
-    end = max([chart.couplings.largest for chart in charts])
+    end = max([chart.largest for chart in charts])
     grids = {
         name: HeatMap(
-            np.where(np.eye(6), np.nan, chart.couplings.correlation),
+            np.where(np.eye(6), np.nan, chart.correlation),
             DOFS,
             'inertial correlation',
             'PuOr_r',
@@ -99,7 +99,7 @@ def _correlation(charts: Sequence[Chart]) -> Drawn:
 def _shares(charts: Sequence[Chart]) -> Drawn:
     values = {}
     for name, chart in coupled(charts):
-        both = chart.couplings.velocity_shares + chart.couplings.input_shares
+        both = chart.velocity_shares + chart.input_shares
         values[name] = 100 * np.where(np.eye(6), np.nan, both)
     largest = max([10 * SMALLEST_SHARE, *map(np.nanmax, values.values())])
     scale = LogNorm(SMALLEST_SHARE, largest, clip=True)
@@ -133,18 +133,18 @@ def _panels(grids: dict[str, HeatMap]) -> Figure | None:
 
 
 def _strength(charts: Sequence[Chart]) -> Drawn:
-    shown = [chart for chart in charts if not chart.couplings.is_diagonal]
+    shown = [chart for chart in charts if not chart.is_diagonal]
     title = 'Strength of inertial coupling'
     if not shown:
         return None, title, f'{title}:{uncoupled(charts)}'
     figure = plots.new_figure(0.9 + 0.3 * len(shown))
     axes = figure.subplots()
     places = np.arange(len(shown))
-    axes.barh(places, [100 * c.couplings.strength for c in shown], color=COLOURS[5], height=0.7)
-    axes.plot([100 * c.couplings.largest for c in shown], places, 'o', color=COLOURS[0])
+    axes.barh(places, [100 * c.strength for c in shown], color=COLOURS[5], height=0.7)
+    axes.plot([100 * c.largest for c in shown], places, 'o', color=COLOURS[0])
     for i, chart in enumerate(shown):
-        pair = '–'.join(chart.couplings.pairs[0])
-        axes.annotate(pair, (100 * chart.couplings.strength, i), xytext=(9, 0), va='center',
+        pair = '–'.join(chart.pairs[0])
+        axes.annotate(pair, (100 * chart.strength, i), xytext=(9, 0), va='center',
                       textcoords='offset points', fontsize='medium')  # fmt: skip
     axes.set_yticks(places, [chart.name for chart in shown])
     axes.set(ylim=(len(shown) - 0.5, -0.5), xlabel='cross terms / energy without them (%)')
@@ -160,13 +160,13 @@ def _strength(charts: Sequence[Chart]) -> Drawn:
 
 def _reached(charts: Sequence[Chart], kind: str) -> Drawn:
     """Peaks of case 1 scaled to each vehicle, of those that are coupled and did not diverge."""
-    shown = [c for c in charts if not c.couplings.is_diagonal and not c.reached['failure']]
+    shown = [c for c in charts if not c.is_diagonal and not c.reached['failure']]
     symbol, units = KINDS[kind]
     title = f'{symbol} reached in case 1'
     if not shown:
         return None, title, f'{title}:{uncoupled(charts)}'
     values = np.array([chart.reached[f'{kind}_max'] for chart in shown])
-    always = np.array([[dof in c.couplings.zeros[kind] for dof in DOFS] for c in shown])
+    always = np.array([[dof in c.zeros[kind] for dof in DOFS] for c in shown])
     halves = slice(0, 3), slice(3, 6)
     grids = [
         HeatMap(values[:, half], DOFS[half], f'{symbol} ({unit})', structural=always[:, half])

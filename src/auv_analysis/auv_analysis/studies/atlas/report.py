@@ -63,7 +63,7 @@ def write_report(out: Path, charts: Sequence[Chart], figures: Mapping[str, Figur
 
 def findings(charts: Sequence[Chart]) -> list[Sentence]:
     """Sentences of the summary: strongest, without coupling, failures."""
-    first = charts[0].couplings
+    first = charts[0]
     found = []
     if not first.is_diagonal:
         i, j = first.pairs[0]
@@ -103,12 +103,11 @@ def ranking(results: Results, charts: Sequence[Chart]) -> Table:
         {
             'vehicle': chart.name,
             **{key: ('vehicles', chart.name, key) for key in numbers},
-            'between': '–'.join(known.pairs[0]) if known.pairs else 'none',
-            **{kind: _words(known.zeros[kind]) for kind in KINDS},
-            'damped': ', '.join('–'.join(pair) for pair in known.damped) or 'none',
+            'between': '–'.join(chart.pairs[0]) if chart.pairs else 'none',
+            **{kind: _words(chart.zeros[kind]) for kind in KINDS},
+            'damped': ', '.join('–'.join(pair) for pair in chart.damped) or 'none',
         }
         for chart in charts
-        for known in [chart.couplings]
     ]
     caption = 'Vehicles by the strength of inertial coupling.'
     return document_table(results, 'ranking', caption, rows, shown)
@@ -141,7 +140,7 @@ def pairs(results: Results, charts: Sequence[Chart]) -> Table:
     rows = []
     for chart in charts:
         base = 'vehicles', chart.name
-        for first, second in chart.couplings.pairs:
+        for first, second in chart.pairs:
             i, j = DOFS.index(first), DOFS.index(second)
             rows.append({
                 'vehicle': chart.name, 'deformed': first, 'by': second,
@@ -167,7 +166,7 @@ def reached(results: Results, charts: Sequence[Chart], kind: str) -> Table:
     for chart in charts:
         if chart.reached['failure']:
             continue
-        base, always = ('vehicles', chart.name, 'case1'), chart.couplings.zeros[kind]
+        base, always = ('vehicles', chart.name, 'case1'), chart.zeros[kind]
         peaks = {d: (*base, f'{kind}_max', i) for i, d in enumerate(DOFS) if d not in always}
         energy = int(np.argmax(chart.reached['delta_xi_energy_percent']))
         most = {'energy': (*base, 'delta_xi_energy_percent', energy)}

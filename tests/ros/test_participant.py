@@ -63,14 +63,18 @@ def test_where_ros_does_not_start_one_line_says_why(monkeypatch) -> None:
 
 def test_who_cannot_be_made_leaves_the_domain() -> None:
     contexts: list[Context] = []
+    domains: list[int] = []
 
     def refuse(context: Context) -> Node:
         contexts.append(context)
+        domains.append(context.get_domain_id())
         raise InputError('x', 'y', 'z', 'w')
 
+    domain = fresh_domain()
     with pytest.raises(InputError):
-        Participant(fresh_domain(), refuse)
+        Participant(domain, refuse)
     assert not contexts[0].ok()
+    assert domains == [domain]
 
 
 def until(graph: Watcher, done: Callable[[], bool]) -> None:

@@ -983,20 +983,28 @@ def test_who_has_left_before_the_end_is_not_waited_for_without_end(
     tmp_path: Path, timers, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture
 ) -> None:
     """A plant that is killed, with nobody beside it who would notice."""
-    monkeypatch.setattr(recorder_node, 'GONE', 0.0)
     with program() as made:
         node = recorder_in(made, tmp_path / 'bag', strict=False, duration=0.2)
+        longer = recorder_in(made, tmp_path / 'longer', strict=False, duration=1000.0)
         timers[0]()
         odometry = made.node.create_publisher(topics.ODOM.type, 'odom', 10)
         made.node.create_publisher(topics.WRENCH.type, 'wrench', 10)
         give_steps(node, *range(15))
+        give_steps(longer, *range(15))
         made.spin(0.3)
+        monkeypatch.setattr(recorder_node, 'GONE', 0.0)
         timers[0]()
         assert node.exit_code is None, 'it may only be silent for a while'
         made.node.destroy_publisher(odometry)
         made.until(lambda: not made.node.count_publishers('odom'), 'its end')
+        monkeypatch.setattr(recorder_node, 'GONE', PATIENCE)
         timers[0]()
+        assert node.exit_code is None, 'what it sent may be under way'
+        monkeypatch.setattr(recorder_node, 'GONE', 0.0)
+        for report in (timers[0], timers[3]):
+            report()
         assert node.exit_code == 1
+        assert longer.exit_code is None, 'its time has not passed'
         made.drop(node)
     assert 'came to step 14 of 20: nobody publishes odom any more' in capfd.readouterr().err
     assert read_bag(tmp_path / 'bag', decode=False).counts['/odom'] == 15
@@ -1008,7 +1016,9 @@ def test_a_topic_that_stays_away_does_not_make_a_recording_endless(
     """A controller has died; a vehicle goes on saying where it is."""
     with program() as made:
         node = recorder_in(made, tmp_path / 'bag', strict=False, duration=0.2)
+        strict = recorder_in(made, tmp_path / 'strict', duration=0.2)
         give_steps(node, *range(15))
+        give_steps(strict, *range(15))
         made.spin(0.3)
         monkeypatch.setattr(recorder_node, 'GONE', 0.0)
         monkeypatch.setattr(recorder_node, 'PATIENCE', math.inf)
@@ -1018,10 +1028,13 @@ def test_a_topic_that_stays_away_does_not_make_a_recording_endless(
         for k in range(15, 21):
             timers[0]()
             assert node.exit_code is None
-            give(node, 'odom', convert.odometry(k * STEP, UPRIGHT, FRAMES))
+            for one in (node, strict):
+                give(one, 'odom', convert.odometry(k * STEP, UPRIGHT, FRAMES))
         timers[0]()
         assert node.exit_code is None, 'a wrench may be under way'
-        timers[0]()
+        for report in (timers[0], timers[3], timers[3]):
+            report()
         assert node.exit_code == 1
+        assert strict.exit_code is None, 'in lock-step the plant waits for it'
         made.drop(node)
     assert 'came to step 20 without wrench' in capfd.readouterr().err

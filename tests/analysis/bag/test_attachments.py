@@ -36,14 +36,20 @@ def test_parameters_are_those_of_nodes_whatever_their_namespaces() -> None:
     assert found == {'plant_node': {'step': 0.01}, 'controller_node': {'law': 'gvc'},
                      'recorder_node': {}}  # fmt: skip
     nested = {'/sea': {'auv1': {'controller_node': {'ros__parameters': {'law': 'gvc'}}}},
+              '/**/controller_node': {'ros__parameters': {'law': 'pid'}},
               'auv2': {'controller_node': {'ros__parameters': {'law': 'cl'}}}}  # fmt: skip
-    for space, law in (('/sea/auv1', 'gvc'), ('/auv2', 'cl')):
+    for space, law in (('/sea/auv1', 'gvc'), ('/auv2', 'cl'), ('/auv3', 'pid')):
         bag = contents(params=nested)
         bag.namespace = space
         assert attachments.parameters_of(bag, BAG) == {'controller_node': {'law': law}}
+    bag.recorder = '/auv1'  # whom the pattern is about
+    assert attachments.parameters_of(bag, BAG) == {}
     assert attachments.parameters_of(BagContents(), BAG) == {}
-    for wrong in ({'plant_node': 7}, {'plant_node': {'step': 0.01}}):
-        with pytest.raises(InputError, match=r'params.yaml: plant_node: expected a mapping with'):
+    for wrong, key in (
+        ({'plant_node': 7}, 'plant_node'), ({'plant_node': {'step': 0.01}}, 'plant_node'),
+        ({'sea': {'a': {'ros__parameters': {}}, 'plant_node': 7}}, 'sea/plant_node'),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=f'params.yaml: {key}: expected a mapping with'):
             attachments.parameters_of(contents(params=wrong), BAG)
 
 
@@ -176,6 +182,9 @@ def test_what_counts_for_a_topic_that_is_missing_is_said(told, kind, signal, top
     assert by_fault == by_scenario
     assert attachments.unrecorded(told, {kind}, {topic}) == {}
     assert attachments.unrecorded({}, set(), {'odom'}) == {}
+    (unknown,) = attachments.unrecorded(None, set(), {'disturbance'}).items()
+    assert unknown[0] == 'disturbance_estimate'
+    assert unknown[1].endswith('f and its error are unknown')
 
 
 def test_kinds_of_disturbances_are_known_where_a_scenario_is() -> None:

@@ -115,7 +115,7 @@ def _nodes(entries: dict[str, Any], file: str, above: str = '') -> Iterator[tupl
         values = entry.get('ros__parameters') if isinstance(entry, dict) else None
         if isinstance(values, dict):
             space, _, node = name.rpartition('/')
-            yield space.strip('/'), node, values
+            yield space, node, values
         elif isinstance(entry, dict) and any(isinstance(inner, dict) for inner in entry.values()):
             yield from _nodes(entry, file, name)
         else:

@@ -193,6 +193,11 @@ def test_in_lock_step_odometry_of_an_inactive_one_is_answered_once_it_is_active(
     assert_allclose(by_hand.six_of(made.heard['wrench'][-1]), tau, rtol=1e-9)
     answers_as(made, 'gvc', PER_AXIS | {'k_D': [7.0]}, STEPS + 1)
     assert len(made.heard['wrench']) == 2 * STEPS + 1, 'and that once'
+    assert node.trigger_deactivate() == TransitionCallbackReturn.SUCCESS
+    made.publish(topics.ODOM, by_hand.odometry(9 * STEP, [*ETA[0, :3], 1, 0, 0, 0, *[1e6] * 6]))
+    made.until(lambda: node._missed, 'an odometry that is not believed')
+    assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
+    assert [*node.graph.refused] == ['odom: twist.linear']
 
 
 def test_limits_that_are_changed_while_inactive_are_taken(made, vehicle) -> None:

@@ -116,6 +116,7 @@ def test_what_decides_whom_a_controller_hears_is_fixed() -> None:
         (3, float, 3.0), (True, float, True), ('a', float, 'a'), (2.5, list[float], [2.5]),
         ((1, 2.5), list[float], [1.0, 2.5]), ([1.0, True], list[float], [1.0, True]),
         ([1, '2'], list[float], [1, '2']), (('a', 'b'), list[str], ['a', 'b']), (7, int, 7),
+        ('', list[float], ''),
     ],
 )  # fmt: skip
 def test_only_numbers_are_taken_for_numbers(given, kind, taken) -> None:

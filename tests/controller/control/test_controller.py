@@ -14,7 +14,6 @@ from auv_gvc_controller.control.sampled import SampledLaw
 from auv_gvc_controller.control.setpoint_buffer import (
     DIFFERENCE,
     SAME,
-    FilterSettings,
     ReferenceFilter,
     SetpointBuffer,
 )
@@ -422,7 +421,7 @@ def test_what_a_silent_publisher_left_ahead_is_not_obeyed_when_another_begins(ac
 def test_what_one_publisher_left_ahead_is_not_obeyed_once_another_is_heard(
     acceleration, late, first
 ):
-    bench, stop = Bench(setpoint=0.5, acceleration=acceleration, steepest=FILTER.steepest), ZERO
+    bench, stop = Bench(setpoint=0.5, acceleration=acceleration, steepest=STEEPEST), ZERO
     keep = {
         'setpoint': lambda ms, at: bench.pairing.setpoint(ms * MS, stop, at),
         'derivative': lambda ms, _: bench.pairing.derivative(ms * MS, stop),
@@ -468,7 +467,13 @@ def test_a_reset_while_the_law_is_in_charge_is_no_jump():
     assert after[0] < 0.9 * before[0]
 
 
-FILTER = FilterSettings(1.0, 1.0, 3.0, 1.0, 0.2, 0.2)
+STEEPEST = (0.2,) * 6
+
+
+def a_filter() -> ReferenceFilter:
+    return ReferenceFilter(1.0, 1.0, (3.0,) * 3 + (1.0,) * 3, STEEPEST)
+
+
 BY_HAND = {  # stamp in ms -> surge, m/s
     'a step': {0: 0.0, 100: 0.5},
     'steps at 10 Hz': {0: 0.0, 100: 0.25, 200: 0.5, 300: 0.25, 400: 0.5},
@@ -481,8 +486,8 @@ BY_HAND = {  # stamp in ms -> surge, m/s
 def test_set_points_by_hand_take_little_more_than_holds_the_speed(how, acceleration):
     """The vehicle follows exactly: what is asked is the feed-forward of the set-point alone."""
     bench = Bench(
-        acceleration=acceleration, setpoint=60.0, steepest=FILTER.steepest,
-        reference=ReferenceFilter(FILTER) if acceleration == 'filter' else None,
+        acceleration=acceleration, setpoint=60.0, steepest=STEEPEST,
+        reference=a_filter() if acceleration == 'filter' else None,
         gains=make_gains('gvc', {'k_D': 1e-6, 'k_I': 0.0, 'Lambda': 1e-6, 'Gamma': 0.0}),
     )  # fmt: skip
     still = (0.0, 0.0, 3.0, 1.0, *[0.0] * 9)
@@ -494,11 +499,11 @@ def test_set_points_by_hand_take_little_more_than_holds_the_speed(how, accelerat
         found.append(abs(bench.controller.odometry(ms * MS, still, now).tau[0]))
     held = bench.law.sample(0.0, 0.0, ZERO, UP, (0.5, *ZERO[1:]), ZERO)[0][0]
     assert found[-1] == pytest.approx(held, rel=0.02)
-    assert max(found) <= found[-1] + load_vehicle('rexrov').M[0, 0] * FILTER.acceleration
+    assert max(found) <= found[-1] + load_vehicle('rexrov').M[0, 0] * STEEPEST[0]
 
 
 def test_the_reference_begins_at_the_velocity_of_the_vehicle():
-    reference = ReferenceFilter(FILTER)
+    reference = a_filter()
     bench = Bench(reference=reference, setpoint=0.05)
     bench.setpoint(0, (2.0, *[0.0] * 5))
     at_rest = bench.law.sample(0.0, 0.0, odometry(0.7)[7:], UP, odometry(0.7)[7:], ZERO)[0]

@@ -32,8 +32,10 @@ def test_each_limit_is_that_of_its_name():
     names = 'omega', 'zeta', 'speed', 'rate', 'acceleration', 'angular_acceleration'
     values = dict(zip(names, (1.5, 2.0, 3.0, 0.4, 0.3, 0.1), strict=True))
     given = {f'setpoint_filter__{name}': value for name, value in values.items()}
-    assert vars(settings(**given).reference_filter) == values
-    assert settings(**given).believed[1] == (0.3,) * 3 + (0.1,) * 3
+    built = settings(**given)._reference_filter()
+    assert (built._omega, built._zeta) == (1.5, 2.0)
+    assert built._fastest == (3.0,) * 3 + (0.4,) * 3
+    assert built._steepest == settings(**given).believed[1] == (0.3,) * 3 + (0.1,) * 3
     assert settings(**given, lockstep=True).believed[1] is None
 
 

@@ -2,38 +2,11 @@
 
 import math
 from collections import OrderedDict
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from auv_gvc_controller.control.odometry_guard import ZERO, Limits
 
 Six = tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class FilterSettings:
-    """Of a second-order low-pass filter per axis, with limits.
-
-    Attributes
-    ----------
-    omega : natural frequency, rad/s
-    zeta : damping ratio; from 1 on nothing overshoots
-    speed, rate : largest nu_d of a linear and an angular axis, m/s and rad/s
-    acceleration, angular_acceleration : largest nu_d_dot, m/s2 and rad/s2
-
-    """
-
-    omega: float
-    zeta: float
-    speed: float
-    rate: float
-    acceleration: float
-    angular_acceleration: float
-
-    @property
-    def steepest(self) -> Six:
-        """(6,) largest nu_d_dot."""
-        return (self.acceleration,) * 3 + (self.angular_acceleration,) * 3
 
 
 class ReferenceFilter:
@@ -43,11 +16,17 @@ class ReferenceFilter:
 
     Implicit Euler steps: stable for every step of time, without overshoot where zeta >= 1, and
     nu_d advances by dt * nu_d_dot exactly, also where a limit holds.
+
+    Parameters
+    ----------
+    omega : natural frequency, rad/s
+    zeta : damping ratio; from 1 on nothing overshoots
+    fastest, steepest : (6,) largest nu_d and nu_d_dot, m/s, rad/s, m/s2 and rad/s2
+
     """
 
-    def __init__(self, settings: FilterSettings):
-        self._settings = settings
-        self._fastest = (settings.speed,) * 3 + (settings.rate,) * 3
+    def __init__(self, omega: float, zeta: float, fastest: Six, steepest: Six):
+        self._omega, self._zeta, self._fastest, self._steepest = omega, zeta, fastest, steepest
         self.start(ZERO)
 
     def start(self, nu: Six) -> None:
@@ -71,13 +50,12 @@ class ReferenceFilter:
 
         """
         if dt > 0.0:
-            gain = dt * self._settings.omega**2
-            damping = 1.0 + 2.0 * self._settings.zeta * self._settings.omega * dt + dt * gain
+            gain = dt * self._omega**2
+            damping = 1.0 + 2.0 * self._zeta * self._omega * dt + dt * gain
             slopes, values = [], []
             for r, v, a, fastest, steepest in zip(
-                setpoint, self._nu_d, self._nu_d_dot, self._fastest, self._settings.steepest,
-                strict=True,
-            ):  # fmt: skip
+                setpoint, self._nu_d, self._nu_d_dot, self._fastest, self._steepest, strict=True
+            ):
                 wanted = (a + gain * (clamped(r, fastest) - v)) / damping
                 reached = clamped(v + dt * clamped(wanted, steepest), fastest)
                 slopes.append(clamped((reached - v) / dt, steepest))

@@ -21,7 +21,6 @@ from auv_gvc_controller.control.setpoint_buffer import (
     FILTER,
     NONE,
     SAME,
-    FilterSettings,
     ReferenceFilter,
     SetpointBuffer,
 )
@@ -139,7 +138,7 @@ class ControllerSettings:
     @property
     def believed(self) -> tuple[Limits, tuple[float, ...] | None]:
         """Limits of set-points, and those of the difference of two."""
-        return self.limits, None if self.lockstep else self.reference_filter.steepest
+        return self.limits, None if self.lockstep else self._steepest
 
     @property
     def exact(self) -> bool:
@@ -152,12 +151,15 @@ class ControllerSettings:
         return Limits(self.limits_speed, self.limits_rate, self.limits_acceleration)
 
     @property
-    def reference_filter(self) -> FilterSettings:
-        """Settings of the reference filter, whether it is used or not."""
-        return FilterSettings(
-            *(self.filter_omega, self.filter_zeta, self.filter_speed, self.filter_rate),
-            *(self.filter_acceleration, self.filter_angular_acceleration),
-        )
+    def _steepest(self) -> tuple[float, ...]:
+        """(6,) largest nu_d_dot of the filter and of the difference."""
+        return (self.filter_acceleration,) * 3 + (self.filter_angular_acceleration,) * 3
+
+    def _reference_filter(self) -> ReferenceFilter | None:
+        if self.setpoint_acceleration != FILTER:
+            return None
+        fastest = (self.filter_speed,) * 3 + (self.filter_rate,) * 3
+        return ReferenceFilter(self.filter_omega, self.filter_zeta, fastest, self._steepest)
 
     def build(self, gains: Any, vehicle: Vehicle, setpoints: SetpointBuffer) -> VelocityController:
         """Controller with a law.
@@ -180,7 +182,6 @@ class ControllerSettings:
             age=StampAge(self.stamp_clock, round(timeouts.odometry * 1e9)) if live else None,
         )
         ramp = 0.0 if self.lockstep else self.ramp
-        filtered = self.setpoint_acceleration == FILTER
         return VelocityController(
             law,
             setpoints,
@@ -188,7 +189,7 @@ class ControllerSettings:
             OutputStage(self._wrench_limit(vehicle), self.limits_wrench_rate, ramp),
             exact=self.exact,
             timeouts=timeouts if live else None,
-            reference_filter=ReferenceFilter(self.reference_filter) if filtered else None,
+            reference_filter=self._reference_filter(),
         )
 
     def check_bounded(self) -> None:

@@ -94,8 +94,6 @@ def graph(**values: object) -> GraphSnapshot:
         'ROS_DOMAIN_ID=7',
         '/odom',
         '/wrench',
-        ODOMETRY,
-        WRENCH,
         odom_publishers=(Endpoint(DRIVER, ODOMETRY),),
         wrench_subscribers=(Endpoint(DRIVER, WRENCH),),
     )

@@ -13,6 +13,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from auv_analysis.bag.step_topics import ODOMETRY as ODOM_TYPE
+from auv_analysis.bag.step_topics import WRENCH as WRENCH_TYPE
 from auv_analysis.driver import odometry_checks, twist_checks
 from auv_analysis.driver import response_checks as response
 from auv_analysis.driver.evidence import (
@@ -39,15 +41,15 @@ DEPTH = 'depths are not told by discovery'
 def odom_publisher(evidence: DriverRecord) -> CheckResult:
     """Publisher of odom."""
     graph = evidence.graph
-    expected = f'one publisher of {graph.odom}, {graph.odom_type}'
+    expected = f'one publisher of {graph.odom}, {ODOM_TYPE}'
     ends = graph.odom_publishers
     if not ends:
         found = f'nobody publishes {graph.odom} in {graph.place}'
-        found += _instead(graph.odom, graph.odom_type, graph.elsewhere, graph.topics)
+        found += _instead(graph.odom, ODOM_TYPE, graph.elsewhere, graph.topics)
         advice = 'start the driver; name its topic with --namespace or --odom; see --domain-id'
         return judged(False, expected, found, advice, publishers=0)
     good = len(ends) == 1 and bool(graph.drivers)
-    advice = f'publish {graph.odom_type}, which carries pose and twist together'
+    advice = f'publish {ODOM_TYPE}, which carries pose and twist together'
     if graph.drivers:
         advice = 'end all but one: the controller cannot tell whose odometry it hears'
     return judged(good, expected, _listed(ends), advice, publishers=len(ends))
@@ -56,7 +58,7 @@ def odom_publisher(evidence: DriverRecord) -> CheckResult:
 def wrench_subscriber(evidence: DriverRecord) -> CheckResult:
     """Subscriber of wrench."""
     graph = evidence.graph
-    expected = f'a subscriber of {graph.wrench}, {graph.wrench_type}'
+    expected = f'a subscriber of {graph.wrench}, {WRENCH_TYPE}'
     ends = graph.wrench_subscribers
     if graph.takers:
         found, driver = _listed(graph.takers), {end.node for end in graph.drivers}
@@ -66,12 +68,12 @@ def wrench_subscriber(evidence: DriverRecord) -> CheckResult:
     if ends:
         found = _listed(ends)
         advice = (
-            f'subscribe {graph.wrench_type}: without its stamp a driver cannot tell an old '
+            f'subscribe {WRENCH_TYPE}: without its stamp a driver cannot tell an old '
             'command from a new one and obeys it for ever'
         )
     else:
         found = f'nobody subscribes {graph.wrench}'
-        found += _instead(graph.wrench, graph.wrench_type, graph.listeners, graph.topics)
+        found += _instead(graph.wrench, WRENCH_TYPE, graph.listeners, graph.topics)
         advice = 'subscribe it in the driver; name its topic with --namespace or --wrench'
     return judged(False, expected, found, advice, subscribers=len(ends))
 
@@ -81,13 +83,13 @@ def wrench_publishers(evidence: DriverRecord) -> CheckResult:
     graph, actuates = evidence.graph, evidence.settings.actuates
     ends, most = graph.wrench_publishers, 0 if actuates else 1
     who = 'nobody' if actuates else 'one controller at most'
-    expected = f'{who} publishes {graph.wrench}, {graph.wrench_type}'
-    good = len(ends) <= most and all(end.type == graph.wrench_type for end in ends)
+    expected = f'{who} publishes {graph.wrench}, {WRENCH_TYPE}'
+    good = len(ends) <= most and all(end.type == WRENCH_TYPE for end in ends)
     advice = 'end all but one: the vehicle would obey them in turn'
     if actuates:
         advice = 'end it, even if it is inactive: with --actuate nobody else may command'
     elif len(ends) <= most:
-        advice = f'publish {graph.wrench_type}, which carries a stamp'
+        advice = f'publish {WRENCH_TYPE}, which carries a stamp'
     return judged(good, expected, _listed(ends), advice, publishers=len(ends))
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.bag.step_topics import ODOMETRY, WRENCH
 from auv_analysis.driver.excitation import Excitation, MeasuredTrial
 from auv_analysis.driver.odometry_log import OdometryLog
 from auv_analysis.metrics.local_polynomials import SMALLEST
@@ -83,7 +84,6 @@ class GraphSnapshot:
     ----------
     place : domain and namespace, in words
     odom, wrench : full names of the topics
-    odom_type, wrench_type : that they should have
     odom_publishers, wrench_publishers, wrench_subscribers, clock_publishers : of these topics
     conflicts : 'controller', 'recorder', 'wrench' -> why our end and the driver's do not match;
         empty where they do
@@ -96,8 +96,6 @@ class GraphSnapshot:
     place: str
     odom: str
     wrench: str
-    odom_type: str
-    wrench_type: str
     odom_publishers: tuple[Endpoint, ...] = ()
     wrench_publishers: tuple[Endpoint, ...] = ()
     wrench_subscribers: tuple[Endpoint, ...] = ()
@@ -110,12 +108,12 @@ class GraphSnapshot:
     @property
     def drivers(self) -> tuple[Endpoint, ...]:
         """Publishers of odometry that has its type."""
-        return tuple(end for end in self.odom_publishers if end.type == self.odom_type)
+        return tuple(end for end in self.odom_publishers if end.type == ODOMETRY)
 
     @property
     def takers(self) -> tuple[Endpoint, ...]:
         """Subscriptions to the wrench that have its type."""
-        return tuple(end for end in self.wrench_subscribers if end.type == self.wrench_type)
+        return tuple(end for end in self.wrench_subscribers if end.type == WRENCH)
 
 
 @dataclass(frozen=True, eq=False)

@@ -104,10 +104,6 @@ class AbortError(RuntimeError):
     """The wrenches must not go on; the text says why."""
 
 
-class StoppedError(RuntimeError):
-    """The user wants an end."""
-
-
 class MotionGuard:
     """Looks at the vehicle between two wrenches.
 
@@ -142,12 +138,12 @@ class MotionGuard:
         return np.linalg.norm(nu.reshape(2, 3), axis=1)
 
     def look(self, planned: float) -> None:
-        """Raise AbortError or StoppedError where the next wrench must not be sent.
+        """Raise AbortError or KeyboardInterrupt where the next wrench must not be sent.
 
         `planned` is the speed of the present trial, m/s and rad/s.
         """
         if self._stopped():
-            raise StoppedError
+            raise KeyboardInterrupt
         newest = self._client.buffer.newest
         if newest is None or self._client.now_ns() - newest[0] > self._timeout * NANOSECONDS:
             raise AbortError(f'no odometry for {self._timeout:g} s')
@@ -178,8 +174,6 @@ def actuate(client: DriverClient, plan: Plan, timeout: float) -> Excitation:
     with on_signals(stop.set):
         try:
             return _announced(client, plan, timeout, stop.is_set)
-        except StoppedError:
-            raise KeyboardInterrupt from None
         finally:
             client.retire()
 
@@ -209,7 +203,7 @@ def _wait(client: DriverClient, seconds: float, stopped: Callable[[], bool]) -> 
     while (left := until - time.monotonic()) > 0:
         client.listen(min(LOOK_AGAIN, left))
         if stopped():
-            raise StoppedError
+            raise KeyboardInterrupt
 
 
 def carry_out(
@@ -231,7 +225,7 @@ def carry_out(
 
     Raises
     ------
-    StoppedError : the user wanted an end; zero was sent
+    KeyboardInterrupt : the user wanted an end; zero was sent
 
     """
     done: list[Sent] = []

@@ -15,12 +15,9 @@ from rclpy.context import Context
 from rclpy.duration import Duration, Infinite
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.publisher import Publisher
-from rclpy.qos import (
-    DurabilityPolicy,
-    LivelinessPolicy,
-    QoSProfile,
-)
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
 
+from auv_analysis.bag.step_topics import ODOMETRY, WRENCH
 from auv_analysis.driver.evidence import Endpoint, GraphSnapshot
 from auv_analysis.driver.odometry_log import NO_STAMP, OdometryBuffer, OdometryLog
 from auv_dynamics.ros import interface, topics
@@ -35,11 +32,9 @@ from auv_dynamics.ros.endpoints import (
 from auv_dynamics.ros.interface import Frames
 from auv_dynamics.ros.node_main import BulkNode
 from auv_dynamics.ros.participant import Participant
-from auv_dynamics.ros.topics import type_name
 
 COMMANDER = 'auv_check_driver'  # its name when it commands: then it is no mere observer
 ACKNOWLEDGED = 0.5  # s that are waited for the last zero to arrive
-ODOMETRY, WRENCH = type_name(Odometry), type_name(WrenchStamped)
 
 
 class CheckNode(BulkNode):
@@ -201,8 +196,6 @@ class RosDriverClient(Participant):
             place,
             odom,
             wrench,
-            ODOMETRY,
-            WRENCH,
             odom_publishers=tuple(map(_endpoint, odometry)),
             wrench_publishers=tuple(map(_endpoint, other_publishers(node, wrench))),
             wrench_subscribers=tuple(map(_endpoint, takers)),

@@ -15,7 +15,7 @@ import zstandard
 from mcap.records import Channel
 
 from auv_analysis.bag.chunks import MessageTable
-from auv_analysis.bag.csv_logs import rows_of_csv, survey_of_csv
+from auv_analysis.bag.csv_logs import survey_of_csv
 from auv_analysis.bag.limits import LARGEST_DECODED, LARGEST_PARSED, MOST_NAMED
 from auv_analysis.bag.mavlink_logs import messages_of_log, survey_of_log
 from auv_analysis.bag.mcap_file import McapFile
@@ -100,9 +100,7 @@ def messages(
         met[topic] += 1
         return math.ceil(met[topic] * share) > math.ceil((met[topic] - 1) * share)
 
-    if is_csv(bag):
-        yield from (LoggedMessage(*found) for found in rows_of_csv(bag, topics, notes))
-    elif is_log(bag):
+    if is_log(bag):
         every = messages_of_log(bag, topics, notes)
         yield from (LoggedMessage(*found) for found in every if taken(found[0]))
     elif is_mcap(bag):

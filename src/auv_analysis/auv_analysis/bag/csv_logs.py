@@ -8,6 +8,7 @@ from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import chain, islice
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,15 +58,6 @@ def blocks_of_csv(
             with Table(file) as table:
                 for block in table.blocks(notes):
                     yield topic, block
-
-
-def rows_of_csv(
-    path: Path, topics: Collection[str], notes: list[str]
-) -> Iterator[tuple[str, int, 'Row']]:
-    """Topic, 0 in the place of a time of logging, and message of every line of some files."""
-    for topic, block in blocks_of_csv(path, topics, notes):
-        for i in range(len(block.lines)):
-            yield topic, 0, Row(block, i)
 
 
 class Span(NamedTuple):
@@ -320,27 +312,13 @@ class Block:
         self._columns[name] = found
         return found
 
-
-class Row:
-    """A line as a message whose fields are the columns, read when they are asked for."""
-
-    __slots__ = ('_block', '_i')
-    header, child_frame_id = None, ''
-
-    def __init__(self, block: Block, i: int):
-        self._block, self._i = block, i
-
-    def __getattr__(self, name: str) -> float:
-        """Return the number of a column."""
-        return float(self._block.column(name)[self._i])
-
-    @property
-    def __dict__(self) -> dict[str, float]:  # type: ignore[override]
-        found = {}
-        for name in self._block.table.columns:
-            with contextlib.suppress(InputError):
-                found[name] = float(self._block.column(name)[self._i])
-        return found
+    def first(self) -> SimpleNamespace:
+        """The first line as a message whose fields are the columns of numbers."""
+        found: dict[str, Any] = {}
+        for name, cell in zip(self.table.columns, self._cells[0], strict=True):
+            with contextlib.suppress(ValueError):
+                found[name] = self.table.number(cell)
+        return SimpleNamespace(**found | {'header': None, 'child_frame_id': ''})
 
 
 def _is_nothing(cell: str) -> bool:

@@ -1,5 +1,6 @@
 """Mapped topics of a bag as arrays: which numbers a message holds, stamps put in order."""
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -7,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.bag.any_bag import messages, survey
-from auv_analysis.bag.csv_logs import CSV, Block, Row, blocks_of_csv
+from auv_analysis.bag.csv_logs import CSV, Block, blocks_of_csv
 from auv_analysis.bag.foreign_fields import (
     FAR,
     FieldError,
@@ -157,10 +158,10 @@ def read_sources(bag: Path, mapping: TopicMap, notes: list[str]) -> dict[str, Re
         for topic, block in blocks_of_csv(bag, by_topic.keys(), notes):
             for one in by_topic[topic]:
                 one.add_block(block)
-        return {key: one.recorded(notes) for key, one in found.items()}
-    for topic, log, message in messages(bag, by_topic.keys(), notes):
-        for one in by_topic[topic]:
-            one.add(log, message)
+    else:
+        for topic, log, message in messages(bag, by_topic.keys(), notes):
+            for one in by_topic[topic]:
+                one.add(log, message)
     return {key: one.recorded(notes) for key, one in found.items()}
 
 
@@ -203,10 +204,11 @@ class _Messages:
 
     def add_block(self, block: Block) -> None:
         """Take the next lines of a table."""
+        with suppress(AttributeError):  # a path to no column: the message of a line says which
+            stamps, rows = self._read.block(block.column, len(block.lines))
         if not self._frames:
-            self.add(0, Row(block, 0))  # refuses wrong paths
+            self.add(0, block.first())
             self._waiting.clear()
-        stamps, rows = self._read.block(block.column, len(block.lines))
         self._parts.append((np.stack([stamps, stamps], axis=1), rows))
 
     def add(self, log: int, message: Any) -> None:

@@ -258,7 +258,7 @@ def test_a_report_adds_up_its_files(tmp_path: Path) -> None:
         '/a': 4, '/b': 8
     }  # fmt: skip
     sizes = [(tmp_path / f'bag_{i}.mcap.damaged').stat().st_size for i in (0, 1)]
-    assert {what: (done, of) for what, done, of in seen} == {  # up to the footer
+    assert {what: (done, of) for what, of, done in seen} == {  # up to the footer
         f'{what} bag_{i}.mcap': (size - 8, size)
         for what in ('reading', 'repairing') for i, size in enumerate(sizes)
     }  # fmt: skip

@@ -14,10 +14,8 @@ from zstandard import FRAME_HEADER
 
 from auv_analysis.bag.chunks import MessageTable, by_channel
 from auv_analysis.bag.mcap_file import Lost, McapFile, MessageIndex, Read
-from auv_analysis.bag.metadata import Definition, FileExtent
+from auv_analysis.bag.metadata import Definition, FileExtent, offered_profiles
 from auv_analysis.bag.step_topics import role_of
-from auv_dynamics.files.errors import InputError
-from auv_dynamics.files.yaml_files import parse_any_yaml
 from auv_dynamics.ros.interface import NANOSECONDS, OPTIONAL_STEP_TOPICS, STEP_TOPICS
 
 ROSBAG2 = 'rosbag2'  # metadata that rosbag2 and our recorder write when a file is closed
@@ -79,22 +77,11 @@ class Definitions:
             text = channel.metadata.get('offered_qos_profiles', '')
             left -= len(text)
             if text not in known and left >= 0:
-                known[text] = _qos(text)
+                known[text] = offered_profiles(text)
             qos = known[text] if left >= 0 else []
             definition = Definition(channel.topic, schema.name, qos=qos, digest=digest)
             found.setdefault(channel.topic, definition)
         return [*found.values()]
-
-
-def _qos(text: str) -> list[Any]:
-    """Offered profiles, none where the text is no list of them, or one that refers to itself."""
-    if '*' in text:
-        return []
-    try:
-        found = parse_any_yaml(text, 'offered_qos_profiles')
-    except InputError:
-        return []
-    return found if isinstance(found, list) else []
 
 
 class Spacing:

@@ -10,7 +10,7 @@ import yaml
 
 from auv_analysis.output.new_files import replacing
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.files.yaml_files import parse_yaml, yaml_text
+from auv_dynamics.files.yaml_files import parse_any_yaml, parse_yaml, yaml_text
 
 DISTRO = 'jazzy'
 BAG = 'a bag: a folder, an .mcap, a .db3 or a ROS 1 .bag file, or a .csv, .tlog or .BIN file'
@@ -161,6 +161,17 @@ def as_text(document: Mapping[str, Any]) -> str:
 def qos_text(qos: list[Any]) -> str:
     """Offered profiles as they stand in the metadata of a channel."""
     return yaml.dump(qos, Dumper=_Dumper, default_flow_style=False, sort_keys=False)
+
+
+def offered_profiles(text: str) -> list[Any]:
+    """What `qos_text` wrote; none of what is no list of them, or one that refers to itself."""
+    if '*' in text:
+        return []
+    try:
+        found = parse_any_yaml(text, 'offered_qos_profiles')
+    except InputError:
+        return []
+    return found if isinstance(found, list) else []
 
 
 def write_metadata(folder: Path, text: str) -> None:

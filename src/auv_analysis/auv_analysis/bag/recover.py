@@ -139,7 +139,7 @@ EXPECTED = 'a bag: a folder with .mcap files, or an .mcap file'
 DAMAGED = '.damaged'  # ends the name under which a damaged file is kept
 QUIET = 2.0  # s: a file that was written more recently is watched for so long
 UNUSED = 'a bag that nobody is recording'
-Progress = Callable[[str, int, int], None]  # what is done, bytes that are done, bytes of all
+Progress = Callable[[str, int, int], None]  # what is done, bytes of all, bytes that are done
 
 
 def recover(bag: Path, progress: Progress = lambda *_: None) -> Report:
@@ -151,7 +151,7 @@ def recover(bag: Path, progress: Progress = lambda *_: None) -> Report:
     Parameters
     ----------
     bag : folder or .mcap file
-    progress : told what is done, bytes that are done and bytes of all
+    progress : told what is done, bytes of all and bytes that are done
 
     Raises
     ------
@@ -199,7 +199,7 @@ def _recover(bag: Path, sources: dict[Path, Path], progress: Progress) -> Report
     inspected = {}
     for target, source in sources.items():
         before, size = state(source), source.stat().st_size
-        show = partial(_show, progress, f'reading {source.name}', size)
+        show = partial(progress, f'reading {source.name}', size)
         inspected[target] = Inspection(source, show), before
     found = [one for one, _ in inspected.values()]
     if not any(_holds_something(one) or not one.faults for one in found):
@@ -222,10 +222,6 @@ def _recover(bag: Path, sources: dict[Path, Path], progress: Progress) -> Report
     if bag.is_dir():
         report.metadata = _settle_metadata(bag, report)
     return report
-
-
-def _show(progress: Progress, what: str, size: int, place: int) -> None:
-    progress(what, place, size)
 
 
 def _holds_something(inspection: Inspection) -> bool:
@@ -343,9 +339,8 @@ def repair(
 
     """
     unfinished = unfinished_name(target)
-    Rewriter(inspection, target.name).write(
-        unfinished, lambda place: progress(f'repairing {target.name}', place, inspection.size)
-    )
+    show = partial(progress, f'repairing {target.name}', inspection.size)
+    Rewriter(inspection, target.name).write(unfinished, show)
     if state(inspection.path) != before:
         unfinished.unlink()
         raise InputError(inspection.path, '', UNUSED, 'a file that is being written')

@@ -22,7 +22,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     with bar(DownloadColumn()) as shown:
         task = shown.add_task('')
 
-        def show(what: str, done: int, of: int) -> None:
+        def show(what: str, of: int, done: int) -> None:
             shown.update(task, description=what, completed=done, total=of)
 
         document = recover(options.bag, show).document()

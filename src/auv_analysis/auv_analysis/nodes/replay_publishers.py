@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import yaml
 from geometry_msgs.msg import Twist, TwistStamped, Wrench, WrenchStamped
 from rclpy.client import Client
 from rclpy.duration import Duration
@@ -19,6 +18,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
+from auv_analysis.bag.metadata import offered_profiles
 from auv_analysis.bag.ros2msg import definition
 from auv_analysis.bag.step_topics import ODOMETRY, role_of
 from auv_analysis.replay.played_bag import PlayedTopic
@@ -109,12 +109,7 @@ def offered_again(recorded: str, *, volatile: bool = False) -> QoSProfile:
 
 def _kept(recorded: str) -> list[int]:
     """Depths of the profiles that keep messages for late comers."""
-    try:
-        profiles: Any = yaml.safe_load(recorded) if len(recorded) < LONGEST else None
-    except (yaml.YAMLError, ValueError, RecursionError):
-        return []
-    if not isinstance(profiles, list):
-        return []
+    profiles = offered_profiles(recorded) if len(recorded) < LONGEST else []
     kept = [p for p in profiles if isinstance(p, dict) and p.get('durability') in KEPT]
     depths = [profile.get('depth') for profile in kept]
     return [d if isinstance(d, int) and 0 < d <= DEPTH else LATE for d in depths]

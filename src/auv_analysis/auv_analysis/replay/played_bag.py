@@ -3,7 +3,7 @@
 import heapq
 import itertools
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -22,21 +22,6 @@ NEVER = 1 << 64  # ns, later than every log time
 LATEST = (1 << 31) * NANOSECONDS  # of a ROS time
 MOST_SPANS = 1000  # of a topic that are told apart
 Span = tuple[int, int]  # ns, first and last log time
-
-
-@dataclass
-class PlayedFile:
-    """One file of a bag.
-
-    Attributes
-    ----------
-    path : of the file
-    least : ns, an entry per table of messages: the earliest log time in it or behind it
-
-    """
-
-    path: Path
-    least: list[int]
 
 
 @dataclass(frozen=True)
@@ -65,7 +50,8 @@ class BagIndex:
     Attributes
     ----------
     bag : its folder or file
-    files : in the order of the recording
+    files : file, in the order of the recording -> an entry per table of messages: the earliest log
+        time in it or behind it, ns
     topics : recorded name -> how it was recorded
     counts : recorded name -> number of messages
     first, last : log times in ns
@@ -76,7 +62,7 @@ class BagIndex:
     """
 
     bag: Path
-    files: list[PlayedFile] = field(default_factory=list)
+    files: dict[Path, list[int]] = field(default_factory=dict)
     topics: dict[str, PlayedTopic] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
     spans: dict[str, list[Span]] = field(default_factory=dict)
@@ -110,7 +96,7 @@ def index_bag(bag: str | Path) -> BagIndex:
     """
     index = BagIndex(Path(bag))
     for path in bag_files(bag):
-        index.files.append(_indexed(path, index))
+        index.files[path] = _indexed(path, index)
     if index.last < 0:
         raise InputError(bag, '', 'a bag with messages', 'none')
     if index.last >= LATEST:
@@ -119,7 +105,7 @@ def index_bag(bag: str | Path) -> BagIndex:
     return index
 
 
-def _indexed(path: Path, index: BagIndex) -> PlayedFile:
+def _indexed(path: Path, index: BagIndex) -> list[int]:
     file, earliest = McapFile(path, index.notes), list[int]()
     for item in file.records():
         if isinstance(item, MessageTable):
@@ -128,7 +114,7 @@ def _indexed(path: Path, index: BagIndex) -> PlayedFile:
         elif isinstance(item, Channel):
             _meet(item, file, index)
     least = np.minimum.accumulate(np.array(earliest[::-1], np.uint64))[::-1]
-    return PlayedFile(path, [int(ns) for ns in least])
+    return [int(ns) for ns in least]
 
 
 def _meet(channel: Channel, file: McapFile, index: BagIndex) -> None:
@@ -193,10 +179,10 @@ def messages(
     """
     heap: list[tuple[int, int, PlayedMessage | None]] = []
     sources: dict[int, Iterator[PlayedMessage]] = {}
-    for number, file in enumerate(index.files):
-        if file.least and file.least[0] <= end:
-            sources[number] = _of_file(file, topics, begin, end)
-            heap.append((file.least[0], number, None))
+    for number, (file, least) in enumerate(index.files.items()):
+        if least and least[0] <= end:
+            sources[number] = _of_file(file, least, topics, begin, end)
+            heap.append((least[0], number, None))
     heapq.heapify(heap)
     while heap:
         _, number, message = heap[0]
@@ -210,10 +196,10 @@ def messages(
 
 
 def _of_file(
-    file: PlayedFile, topics: Collection[str], begin: int, end: int
+    file: Path, least: Sequence[int], topics: Collection[str], begin: int, end: int
 ) -> Iterator[PlayedMessage]:
     waiting: list[tuple[int, int, PlayedMessage]] = []
-    opened = McapFile(file.path)
+    opened = McapFile(file)
     tables, order = 0, itertools.count()
     for item in opened.records():
         if not isinstance(item, MessageTable):
@@ -224,7 +210,7 @@ def _of_file(
             if topic in topics:
                 message = PlayedMessage(int(item.log_times[i]), topic, item.message(i))
                 heapq.heappush(waiting, (message.ns, next(order), message))
-        sure = file.least[tables] if tables < len(file.least) else math.inf
+        sure = least[tables] if tables < len(least) else math.inf
         while waiting and waiting[0][0] <= sure:
             yield heapq.heappop(waiting)[2]
         if sure > end:

@@ -6,7 +6,7 @@ follow from the table.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
 from pathlib import Path
@@ -41,6 +41,7 @@ class Column:
     look : of words: 'maths', ours, whose symbols are set; 'badge', a verdict; 'below', smaller,
         in the cell of the column before; of numbers: 'plain', without trailing zeros
     kind : name of the column that says of each row whether the cell is 'good', 'bad' or 'zero'
+    numeric : whether it holds numbers, which its table sees
 
     """
 
@@ -51,6 +52,7 @@ class Column:
     scale: float = 1.0
     look: Look = ''
     kind: str = ''
+    numeric: bool = False
 
     @property
     def quantity(self) -> Quantity:
@@ -128,19 +130,17 @@ class Table:
     anchor: str = ''
     folded: bool = False
 
-    @cached_property
-    def _numeric(self) -> dict[str, bool]:
+    def __post_init__(self) -> None:
+        """See which columns hold numbers."""
         kinds = {name: self.data.schema.field(name).type for name in self.shown}
-        return {n: pa.types.is_integer(k) or pa.types.is_floating(k) for n, k in kinds.items()}
+        numeric = {n: pa.types.is_integer(k) or pa.types.is_floating(k) for n, k in kinds.items()}
+        shown = {name: replace(c, numeric=numeric[name]) for name, c in self.shown.items()}
+        object.__setattr__(self, 'shown', shown)
 
     @cached_property
-    def columns(self) -> list['Head']:
-        """Heads of the shown columns."""
-        return [
-            Head(c.label, c.unit, c.meaning, self._numeric[name], c.group)
-            for name, c in self.shown.items()
-            if c.look != 'below'
-        ]
+    def columns(self) -> list[Column]:
+        """Shown columns that have a head."""
+        return [column for column in self.shown.values() if column.look != 'below']
 
     @property
     def heads(self) -> list[tuple[str, int]]:
@@ -149,7 +149,7 @@ class Table:
         return [(group, len(list(columns))) for group, columns in runs]
 
     @property
-    def meanings(self) -> list['Head']:
+    def meanings(self) -> list[Column]:
         """Columns whose meaning is said below the table."""
         return [column for column in self.columns if column.meaning]
 
@@ -165,17 +165,17 @@ class Table:
             kind = columns[column.kind][i] or '' if column.kind else ''
             made = self._cell(i, name, column, columns[name][i], kind)
             if column.look == 'below':
-                found[-1] = Cell(**{**vars(found[-1]), 'remark': made.text})
+                found[-1] = replace(found[-1], remark=made.text)
             else:
                 found.append(made)
         if self.anchor and found:
-            found[0] = Cell(**{**vars(found[0]), 'anchor': f'{self.anchor}-{found[0].text}'})
+            found[0] = replace(found[0], anchor=f'{self.anchor}-{found[0].text}')
         return found
 
     def _cell(self, i: int, name: str, column: Column, value: Any, kind: str) -> Cell:
         if value is None:
             return Cell(MISSING)
-        if not self._numeric[name]:
+        if not column.numeric:
             text = spelled(value)
             text = Maths(text) if column.look in ('maths', 'below') else text
             return Cell(text, kind='badge' if column.look == 'badge' else kind)
@@ -198,17 +198,6 @@ class Table:
     def records(self) -> list[dict[str, Any]]:
         """Rows as JSON has them."""
         return cast(list[dict[str, Any]], self.data.to_pylist())
-
-
-@dataclass(frozen=True)
-class Head:
-    """Head of a shown column."""
-
-    label: str
-    unit: str
-    meaning: str
-    numeric: bool
-    group: str
 
 
 def make_table(

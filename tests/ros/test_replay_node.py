@@ -64,7 +64,7 @@ def set_rate(peer: Peer, rate: float) -> None:
 
 def asks(replay: ReplayNode) -> bool:
     """Whether there is somebody who says what he has taken."""
-    clients = replay.player._receivers._clients.values()
+    clients = replay.player.receivers._clients.values()
     return any(client.service_is_ready() for client in clients)
 
 
@@ -337,7 +337,7 @@ def test_waits_for_a_subscriber_that_is_stopped(tmp_path: Path) -> None:
             assert replay.player.published['/odom'] == 1000
             recorder.send_signal(signal.SIGCONT)
             assert ended(peer, replay) == 0
-            assert not replay.player.silent
+            assert not replay.player.receivers.silent
         assert recorder.wait(PATIENCE) == 0
     finally:
         recorder.send_signal(signal.SIGCONT)
@@ -406,7 +406,7 @@ def test_who_does_not_say_that_data_has_arrived_is_given_up_after_ten_seconds(mo
 def test_what_is_not_due_is_not_played_and_others_have_a_turn_between(monkeypatch) -> None:
     now, wait, out = 7.0, 0.5, []
     player = object.__new__(replay_node.Player)
-    player._receivers = SimpleNamespace(ask=lambda **_: None)
+    player.receivers = SimpleNamespace(ask=lambda **_: None)
     player.playback = SimpleNamespace(paused=False, wait=lambda *_: wait, played=lambda _: None)
     player._stream, player._next = (PlayedMessage(k, '/x', b'') for k in range(9)), None
     player._goes_out = lambda message, _: out.append(message.ns) or True
@@ -435,7 +435,7 @@ def test_gives_up_a_subscriber_that_stays_silent(tmp_path: Path, monkeypatch) ->
             recorder.send_signal(signal.SIGSTOP)
             replay.player.run()
             assert ended(peer, replay) == 0
-            assert '/recorder_node' in replay.player.silent
+            assert '/recorder_node' in replay.player.receivers.silent
     finally:
         recorder.send_signal(signal.SIGCONT)
         stop(recorder)

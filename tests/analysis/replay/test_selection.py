@@ -200,8 +200,9 @@ def test_the_document_says_what_went_wrong() -> None:
     chosen = SimpleNamespace(left_out={})
     plan = SimpleNamespace(index=bag, begin=0, end=1, selection=chosen, gaps=[])
     guard = SimpleNamespace(stopped='a pilot')
+    heard = SimpleNamespace(silent=['/odom'])
     player = SimpleNamespace(
-        names={}, published=Counter(), now_ns=0, loops=0, guard=guard, silent=['/odom']
+        names={}, published=Counter(), now_ns=0, loops=0, guard=guard, receivers=heard
     )
     keyboard = SimpleNamespace(ended=False)
     document = replay._document(SimpleNamespace(player=player, plan=plan), keyboard, 1.0)

@@ -208,7 +208,7 @@ def _document(node: Any, keyboard: Keyboard, elapsed: float) -> dict[str, Any]:
         'elapsed': elapsed,
         'interrupted': keyboard.ended,
         'commands_stopped': player.guard.stopped or None,
-        'silent': player.silent,
+        'silent': player.receivers.silent,
         'gaps': [{'from': before, 'to': behind} for before, behind in p.gaps],
         'notes': p.index.notes,
     }

@@ -146,8 +146,8 @@ class Player:
         foreign = settings.allow_commands_to_foreign
         guarded = {topic: self._publishers[topic] for topic in selection.guarded}
         self.guard = CommandGuard(node, guarded, foreign, node.graph.complain)
-        self._commands = Commands(guarded, foreign)
-        self._receivers = Receivers(node, self._publishers)
+        self.commands = Commands(guarded, foreign)
+        self.receivers = Receivers(node, self._publishers)
         self._answers = Answers(node.graph, settings.answers) if settings.answers else None
         self._publish_clock = node.graph.output(topics.CLOCK) if settings.clock else None
         self.playback = Playback(
@@ -178,11 +178,6 @@ class Player:
                 found[name] = '--topics, or under /replay'
         return found
 
-    @property
-    def silent(self) -> list[str]:
-        """Subscribers that did not answer in time: of these nothing is known."""
-        return self._receivers.silent
-
     def waits_for(self) -> str:
         """Which of the expected subscribers are missing, or an empty text."""
         for topic, count in self._plan.expected.items():
@@ -197,13 +192,13 @@ class Player:
 
     def advance(self, now: float) -> float:
         """Publish what is due; s until it is worth looking again."""
-        self._receivers.ask(always=self._peek() is None)
+        self.receivers.ask(always=self._peek() is None)
         until = now + BATCH
         while (message := self._peek()) is not None:
             wait = self.playback.wait(now, message.ns)
             if wait > 0.0:
                 if self.playback.paused:  # also after a step
-                    self._commands.let_go()
+                    self.commands.let_go()
                 return min(wait, LONGEST)
             if now >= until:
                 return 0.0
@@ -215,13 +210,9 @@ class Player:
         self._end_of_bag()
         return SOON
 
-    def meet(self) -> None:
-        """Look who can be asked what has arrived."""
-        self._receivers.find()
-
     def look(self, now: float) -> None:
         """Look who listens."""
-        self._receivers.find()
+        self.receivers.find()
         self.guard.look(now)
         if self._answers and not self.playback.paused:
             self.failure = self._answers.overdue()
@@ -246,10 +237,6 @@ class Player:
         """Go on at another rate."""
         self.playback.change_rate(time.monotonic(), self._ahead(), rate)
 
-    def let_go(self) -> None:
-        """Leave a vehicle that hears the commands without a wrench."""
-        self._commands.let_go()
-
     def _peek(self) -> PlayedMessage | None:
         if self._next is None:
             self._next = next(self._stream, None)
@@ -271,7 +258,7 @@ class Player:
         if waits and is_odometry(topic, kind):
             return False
         allowed = self.guard.may(topic, now)
-        if allowed is None or not self._receivers.have_room(topic):
+        if allowed is None or not self.receivers.have_room(topic):
             return False
         if message.ns != self._clock_ns and self._publish_clock is not None:
             self._publish_clock(message.ns, ())
@@ -282,19 +269,19 @@ class Player:
 
     def _publish(self, topic: str, kind: str, data: bytes) -> None:
         try:
-            self._commands.check(topic, data)
+            self.commands.check(topic, data)
         except BadMessageError as error:
             self._node.graph.refuse(str(error))
             return
         self._publishers[topic].publish(data)
-        self._receivers.sent(topic)
+        self.receivers.sent(topic)
         self.published[topic] += 1
         if self._answers is not None:
             self._answers.sent(topic, kind, data)
 
     def _end_of_bag(self) -> None:
         """Wait until all has been taken; then end, or begin again."""
-        if not self._receivers.have_all() or (self._answers and not self._answers.are_complete()):
+        if not self.receivers.have_all() or (self._answers and not self._answers.are_complete()):
             return
         self.loops += 1
         if self._plan.settings.loop:
@@ -358,7 +345,7 @@ class ReplayNode(BulkNode):
             print(refusal, file=sys.stderr, flush=True)
             self.exit_code = 2
         else:
-            self.player.meet()
+            self.player.receivers.find()
             if met and not self.player.waits_for():
                 self._phase = self._play
                 if self.aloud:
@@ -437,7 +424,7 @@ class ReplayNode(BulkNode):
 
     def close(self) -> None:
         """Leave no vehicle with a wrench."""
-        self.player.let_go()
+        self.player.commands.let_go()
 
 
 class Replay(Participant):

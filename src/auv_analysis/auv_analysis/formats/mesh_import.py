@@ -6,8 +6,8 @@ M_A = -rho int n phi dS (Newman 1977, section 4.13), n out of the hull. Its erro
 the hull is smooth and as h^(4/3) at right-angled edges; both are taken out over three refinements.
 """
 
+import logging
 from collections.abc import Iterator
-from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -436,35 +436,21 @@ def panel_added_mass(triangles: np.ndarray) -> np.ndarray:
     faces = np.column_stack([corners, corners[:, 2]])
     area, middle = _areas(triangles), triangles.mean(axis=1)
     size = np.linalg.norm(area, axis=1)
-    with _quiet(capytaine):
-        mesh = capytaine.Mesh(
-            vertices=triangles.reshape(-1, 3), faces=faces, auto_clean=False, auto_check=False
-        )
-        # what it would work out face by face, which takes a third of all the time
-        vars(mesh).update(
-            faces_normals=area / size[:, None], faces_areas=size, faces_centers=middle,
-            faces_radiuses=np.linalg.norm(triangles[:, 0] - middle, axis=1),
-        )  # fmt: skip
-        # a table of waves is not used without a surface: a small one takes no time
-        small = {'tabulation_nr': 4, 'tabulation_nz': 4, 'tabulation_nb_integration_points': 5}
-        single, double = capytaine.Delhommeau(**small, tabulation_cache_dir=None).evaluate(
-            mesh, mesh, free_surface=np.inf, water_depth=np.inf, adjoint_double_layer=False
-        )
+    logging.getLogger(capytaine.__name__).setLevel(logging.ERROR)  # it tells much of meshes
+    mesh = capytaine.Mesh(
+        vertices=triangles.reshape(-1, 3), faces=faces, auto_clean=False, auto_check=False
+    )
+    # what it would work out face by face, which takes a third of all the time
+    vars(mesh).update(
+        faces_normals=area / size[:, None], faces_areas=size, faces_centers=middle,
+        faces_radiuses=np.linalg.norm(triangles[:, 0] - middle, axis=1),
+    )  # fmt: skip
+    # a table of waves is not used without a surface: a small one takes no time
+    small = {'tabulation_nr': 4, 'tabulation_nz': 4, 'tabulation_nb_integration_points': 5}
+    single, double = capytaine.Delhommeau(**small, tabulation_cache_dir=None).evaluate(
+        mesh, mesh, free_surface=np.inf, water_depth=np.inf, adjoint_double_layer=False
+    )
     flux = np.hstack([area, np.cross(middle, area)])
     normal = flux / size[:, None]
     potential = solve(double, single @ normal, overwrite_a=True, check_finite=False)
     return -(flux.T @ potential)
-
-
-@contextmanager
-def _quiet(capytaine: Any) -> Iterator[None]:
-    """Without what capytaine logs of meshes."""
-    import logging
-
-    log = logging.getLogger(capytaine.__name__)
-    level = log.level
-    log.setLevel(logging.ERROR)
-    try:
-        yield
-    finally:
-        log.setLevel(level)

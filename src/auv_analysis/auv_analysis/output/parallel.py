@@ -8,7 +8,7 @@ import select
 import signal
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextvars import ContextVar
 from typing import TypeVar
 
@@ -39,16 +39,18 @@ def results(tasks: Sequence[Callable[[], T]]) -> Iterator[T]:
     if not (1 < len(tasks) <= MOST and _two_cores()):
         yield from (task() for task in each(tasks, len(tasks)))
         return
-    numbers, copy, answer = _forked(tasks)
-    began, found = time.monotonic(), dict[int, T]()
+    numbers, fill = os.pipe()
+    os.write(fill, bytes(range(len(tasks))))
+    os.close(fill)
+
+    def share(taken: Iterable[tuple[int, bool]]) -> dict[int, T]:
+        return {number: tasks[number]() for number, here in taken if here}
+
     try:
-        for number, here in each(_taken(numbers), len(tasks)):
-            if here:
-                found[number] = tasks[number]()
-        found |= _answered(answer, PATIENCE + 5 * (time.monotonic() - began))
+        with meanwhile(lambda: share(_taken(numbers))) as theirs:
+            found = share(each(_taken(numbers), len(tasks))) | theirs()
     finally:
         os.close(numbers)
-        _end(copy, answer)
     yield from (found[i] if i in found else task() for i, task in enumerate(tasks))
 
 
@@ -58,17 +60,28 @@ def meanwhile(task: Callable[[], T]) -> Iterator[Callable[[], T]]:
     if not _two_cores():
         yield task
         return
-    numbers, copy, answer = _forked([task])
-    os.close(numbers)
+    answer, end = os.pipe()
+    gc.freeze()  # neither process looks through, and so copies, what both have
+    began, copy = time.monotonic(), fork()
+    if not copy:
+        try:
+            with os.fdopen(end, 'wb') as stream:
+                stream.write(pickle.dumps([task()]))
+        finally:
+            os._exit(0)
+    os.close(end)
 
     def result() -> T:
-        found: dict[int, T] = _answered(answer, PATIENCE)
+        found: list[T] = _answered(answer, PATIENCE + 5 * (time.monotonic() - began))
         return found[0] if found else task()
 
     try:
         yield result
     finally:
-        _end(copy, answer)
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(copy, signal.SIGKILL)
+        os.waitpid(copy, 0)
+        os.close(answer)
 
 
 def _two_cores() -> bool:
@@ -92,33 +105,8 @@ def fork() -> int:
         return os.fork()
 
 
-def _forked(tasks: Sequence[Callable[[], T]]) -> tuple[int, int, int]:
-    """End of a pipe with the numbers of tasks, the copy's process id, that of its results."""
-    numbers, fill = os.pipe()
-    os.write(fill, bytes(range(len(tasks))))
-    os.close(fill)
-    answer, end = os.pipe()
-    gc.freeze()  # neither process looks through, and so copies, what both have
-    if copy := fork():
-        os.close(end)
-        return numbers, copy, answer
-    try:
-        done = pickle.dumps({number: tasks[number]() for number, here in _taken(numbers) if here})
-        with os.fdopen(end, 'wb') as stream:
-            stream.write(done)
-    finally:
-        os._exit(0)
-
-
-def _end(copy: int, answer: int) -> None:
-    with contextlib.suppress(ProcessLookupError):
-        os.kill(copy, signal.SIGKILL)
-    os.waitpid(copy, 0)
-    os.close(answer)
-
-
-def _answered(answer: int, patience: float) -> dict[int, T]:
-    """Results of the copy by number; none where it ended or hangs."""
+def _answered(answer: int, patience: float) -> list[T]:
+    """Result of the copy; none where it ended or hangs."""
     said, until = b'', time.monotonic() + patience
     while select.select([answer], [], [], max(0.0, until - time.monotonic()))[0]:
         part = os.read(answer, 1 << 16)
@@ -126,7 +114,7 @@ def _answered(answer: int, patience: float) -> dict[int, T]:
             break
         said += part
     try:
-        found: dict[int, T] = pickle.loads(said)
+        found: list[T] = pickle.loads(said)
     except (EOFError, pickle.UnpicklingError):
-        return {}
+        return []
     return found

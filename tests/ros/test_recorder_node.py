@@ -260,6 +260,22 @@ def test_publications_are_followed_by_their_numbers() -> None:
         strict.add('clock', 9)
 
 
+def test_numbers_of_two_publishers_in_turn_are_no_gaps(tmp_path: Path) -> None:
+    given = {'bag': str(tmp_path / 'bag'), 'topics': ['odom'], 'strict': False}
+    with program() as made:
+        recorder = made.add(RecorderNode, given)
+        kind, name = topics.CMD_VEL.type, topics.CMD_VEL.name
+        one, other = (made.node.create_publisher(kind, name, 10) for _ in range(2))
+        made.until(lambda: recorder.count_publishers(name) == 2, 'both')
+        made.until(one.get_subscription_count, 'the recorder')
+        made.until(other.get_subscription_count, 'the recorder')
+        newest = recorder._publications._newest
+        for output, number in ((one, 1), (one, 2), (one, 3), (other, 1), (one, 4)):
+            output.publish(convert.twist(number, [0.0] * 6, Frames()))
+            made.until(lambda n=number: newest.get(name) == n, 'a message')
+        assert recorder._publications.gaps == {}
+
+
 LAST = 123_456_789  # ns
 
 

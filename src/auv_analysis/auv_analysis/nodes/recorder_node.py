@@ -1,7 +1,7 @@
 """Which steps and publications have arrived: nothing lost, nothing doubled."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -102,17 +102,18 @@ class StepLedger:
 class PublicationLedger:
     """Follows the numbers that the middleware gives to a publisher's messages.
 
-    It sees what the steps do not show, a loss on a topic that has no message for every step. Each
-    topic is taken to have one publisher; the first number is any, for one may have joined late.
+    It sees what the steps do not show, a loss on a topic that has no message for every step. The
+    first number is any, for a publisher may have joined late.
 
     Parameters
     ----------
     strict : a gap is an error, else it is only counted
+    several : whether a topic has several publishers, whose numbers tell nothing; without `strict`
 
     """
 
-    def __init__(self, strict: bool = True):
-        self._strict = strict
+    def __init__(self, strict: bool = True, several: Callable[[str], bool] = lambda _: False):
+        self._strict, self._several = strict, several
         self._newest: dict[str, int] = {}
         self.gaps: dict[str, int] = {}
 
@@ -122,7 +123,7 @@ class PublicationLedger:
             return
         last = self._newest.get(topic, number)
         self._newest[topic] = number
-        if number > last + 1:
+        if number > last + 1 and (self._strict or not self._several(topic)):
             self.gaps[topic] = self.gaps.get(topic, 0) + number - last - 1
             if self._strict:
                 text = f'{topic}: expected publication {last + 1}, found {number}'
@@ -150,7 +151,9 @@ class RecorderNode(BulkNode):
         ahead = () if p.strict else (topics.CMD_VEL.name, topics.CMD_ACCEL.name)
         self._counted = [topic for topic in p.topics if topic not in ahead] or list(p.topics)
         self._ledger = StepLedger(self._counted, grid.step_ns, p.strict)
-        self._publications = PublicationLedger(p.strict)
+        self._publications = PublicationLedger(
+            p.strict, lambda topic: self.count_publishers(self.resolve_topic_name(topic)) > 1
+        )
         self._time = GraphClock(self, p.strict)
         awaited = (topics.CLOCK, *topics.ANALYSIS_TOPICS)
         self._newest = {topic.name: -1 for topic in awaited}  # stamps, ns

@@ -131,6 +131,19 @@ def test_silence_is_counted_from_arrivals_whatever_the_stamps_say(arrived, stamp
         guard.look(0.1)
 
 
+def test_a_measurement_that_is_repeated_is_silence() -> None:
+    driver, now = SimulatedDriver(), 0
+    driver.buffer, driver.now_ns = OdometryBuffer(), lambda: now
+    guard = MotionGuard(driver, 0.1, 0.5, lambda: False)
+    for now, stamp in ((0, 7), (200_000_000, 8), (400_000_000, 8), (700_000_000, 8)):
+        driver.buffer.odometry(now, stamp, tuple(LEVEL), ('', ''), None)
+        guard.look(0.1)
+    now = 701_000_000
+    driver.buffer.odometry(now, 8, tuple(LEVEL), ('', ''), None)
+    with pytest.raises(AbortError, match='no odometry of a new stamp for'):
+        guard.look(0.1)
+
+
 def test_a_wrench_above_a_dead_band_leaves_the_others_their_speed() -> None:
     heavy = load_vehicle('bluerov2_heavy')  # whose file tells the dead band of its thrusters
     plan = plan_of(heavy, ['surge', 'yaw'], 0.01, None, None, raised=0.5)

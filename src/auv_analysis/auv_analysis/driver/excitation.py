@@ -111,7 +111,7 @@ class MotionGuard:
     ----------
     client : of whom it hears
     speed : m/s and rad/s of the plan
-    timeout : s of silence of the odometry that end it
+    timeout : s of silence of the odometry that end it; a stamp that comes again is silence
     stopped : whether the user wants an end
 
     Raises
@@ -124,7 +124,8 @@ class MotionGuard:
         self, client: DriverClient, speed: float, timeout: float, stopped: Callable[[], bool]
     ):
         self._client, self._timeout, self._stopped = client, timeout, stopped
-        self._count = 0
+        self._count = self._heard = 0  # ns: arrival of the newest stamp
+        self._stamp: int | None = None
         before, most = self._speeds(), TOO_FAST * speed
         if not (before <= most).all():
             found = f'it moves by {before.max():.3g} m/s or rad/s already, over {most:.3g}'
@@ -145,8 +146,13 @@ class MotionGuard:
         if self._stopped():
             raise KeyboardInterrupt
         newest = self._client.buffer.newest
-        if newest is None or self._client.now_ns() - newest[0] > self._timeout * NANOSECONDS:
-            raise AbortError(f'no odometry for {self._timeout:g} s')
+        if newest is not None and newest[1] != self._stamp:
+            self._heard, self._stamp, _ = newest
+        latest = self._client.now_ns() - self._timeout * NANOSECONDS
+        if self._heard < latest:
+            repeated = newest is not None and newest[0] >= latest
+            new = ' of a new stamp' if repeated else ''
+            raise AbortError(f'no odometry{new} for {self._timeout:g} s')
         speeds, most = self._speeds(), TOO_FAST * planned + self._before
         if not (speeds <= most).all():  # NaN is too fast as well
             i = int(np.argmax(speeds - most))

@@ -192,6 +192,16 @@ def test_a_law_that_takes_over_is_on_its_ramp_for_a_while(
     assert found.notes[0].startswith(f'{first} odometry messages left out')
 
 
+@pytest.mark.parametrize(('ramp', 'at_first', 'said'), [(0.1, 1, 1), (0.1, 0, 0), (0.0, 1, 0)])
+def test_a_bag_that_begins_while_the_law_is_in_charge_says_so(tmp_path, ramp, at_first, said):
+    loop = recorded_loop(write(tmp_path / 'bag.mcap', params={**REAL_TIME, 'ramp': ramp}))
+    ns, tau = loop.series['wrench'][0], np.ones((COUNT, 6))
+    tau[0] = at_first
+    found = open_loop(replace(loop, series={**loop.series, 'wrench': (ns, tau)}), 'gvc', GAINS)
+    begin = 'the recorded law was in charge before the bag begins'
+    assert sum(note.startswith(begin) for note in found.notes) == said
+
+
 @pytest.mark.parametrize(('more', 'times'), [(0, 1), (1, 2)])
 def test_after_a_silence_that_a_watchdog_hears_a_law_begins_anew(
     tmp_path: Path, more: int, times: int

@@ -350,6 +350,9 @@ class _Course:
             (late, 'odometry messages that it answered came after the last one of the bag'),
         )  # fmt: skip
         self.notes = tuple(f'{count} {text}' for count, text in told if count)
+        if self._ramp and tau[first[0]].any() and not early:
+            begin = 'the recorded law was in charge before the bag begins'
+            self.notes += (f'{begin}: this law begins without its integrals',)
 
     def stretch(self, ns: int) -> int:
         """Number of the time in charge that the odometry of a stamp belongs to; 0: to none."""

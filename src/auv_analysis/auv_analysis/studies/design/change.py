@@ -309,11 +309,12 @@ class ChangeSpace:
         """
         shift, ballast, at = x[..., 0:3], x[..., 3], x[..., 4:7]
         radius, centre, normal = x[..., 7], x[..., 8:11], normal_of(x[..., 11], x[..., 12])
-        moved = point_mass(self.mass, self.vehicle.r_G + shift) - self._body
+        r_G = self.vehicle.r_G
+        moved = point_mass(self.mass, r_G + shift) - point_mass(self.mass, r_G)
         disc = disc_added_mass(radius, centre, normal, self.density)
         return ChangeEffect(
             M=moved + point_mass(ballast, at) + disc,
-            couple=self._couple(x),
+            couple=self.vehicle.weight * shift,
             drag=disc_drag(radius, centre, normal, self.density),
         )
 
@@ -323,25 +324,15 @@ class ChangeSpace:
         What turns it from level, squared, in proportion to what rights it, and the loss of what
         rights it, likewise; negative where it is nearer to level than before.
         """
-        vehicle, change = self.vehicle, self._couple(x)
+        vehicle, change = self.vehicle, self.vehicle.weight * x[..., 0:3]
+        length = float(semi_axes(vehicle, self.data)[0].mean())
         before = vehicle.weight * vehicle.r_G - vehicle.buoyancy * vehicle.r_B
-        rights = max(before[2], LEAST_RIGHTING * vehicle.weight * self._length)
+        rights = max(before[2], LEAST_RIGHTING * vehicle.weight * length)
         turns = (((before + change)[..., :2] ** 2).sum(axis=-1) - before[:2] @ before[:2]) / (
             before[:2] @ before[:2] + rights**2
         )
         lost = np.minimum(change[..., 2], 0.0) / rights
         return turns + lost**2
-
-    def _couple(self, x: np.ndarray) -> np.ndarray:
-        return self.vehicle.weight * x[..., 0:3]
-
-    @cached_property
-    def _body(self) -> np.ndarray:
-        return point_mass(self.mass, self.vehicle.r_G)
-
-    @cached_property
-    def _length(self) -> float:
-        return float(semi_axes(self.vehicle, self.data)[0].mean())
 
     def size(self, x: np.ndarray) -> np.ndarray:
         """How large a change is: 0 none, 1 for each part that is at its bound; (..., 13) to (...).

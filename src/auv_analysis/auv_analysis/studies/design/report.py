@@ -89,9 +89,7 @@ def _findings(result: DesignStudy) -> Iterator[Sentence]:
     document = result.document
     source = 'table-measures' if document['measures'] else ''
     yield Sentence(document['statement'], source)
-    if not document['measures']:
-        return
-    for warning in document['warnings']:
+    for warning in document.get('warnings', ()):
         yield Sentence(f'{capital(warning)}.', 'proposal')
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.metrics.authority import beyond_authority
+from auv_analysis.metrics.measures import TOTAL
 from auv_analysis.metrics.quantities import METRICS
 from auv_analysis.metrics.summary import summarize
 from auv_analysis.output.folder import ResultsFolder
@@ -37,10 +38,10 @@ from auv_gvc_controller.laws.model import decompose
 AT_BOUND = 2e-3  # of a range: a value that is nearer to its end lies on it
 DESIGN, BEFORE, AFTER = 'design.json', 'summary_before.json', 'summary.json'
 MEASURES = (  # keys of a summary
-    'coupling.delta_xi_max', 'coupling.delta_pi_max', 'kinetic_energy.shares_percent',
-    'effort.rms', 'effort.max', 'velocity_error.rms', 'velocity_error.max_after_2s',
+    'coupling.delta_xi_max', 'coupling.delta_pi_max', 'kinetic_energy.mean',
+    'kinetic_energy.shares_percent', 'effort.rms', 'effort.max', 'velocity_error.rms',
+    'velocity_error.max_after_2s',
 )  # fmt: skip
-ENERGY = 'kinetic_energy.mean'
 ASSUMPTIONS = (
     'The inertia about the centre of gravity stays as it is when the centre of gravity is moved.',
     'Ballast is a point mass; foam at its place carries its weight, so that W - B and the '
@@ -104,17 +105,15 @@ def measures(
     """
     rows = []
     for metric in MEASURES:
-        name, unit_of = metric.removeprefix('coupling.'), METRICS[metric].unit_of
-        kind = name.removesuffix('_max')
+        name, (group, _, key) = metric.removeprefix('coupling.'), metric.partition('.')
+        old, new = before[group][key], after[group][key]
+        if metric == TOTAL:
+            rows.append({'name': name, 'unit': METRICS[metric].unit, 'before': old, 'after': new})
+            continue
         for i, dof in enumerate(DOFS):
-            if kind in coupled and dof not in coupled[kind]:
-                continue
-            rows.append(
-                _row(f'{name}.{dof}', unit_of(i), _at(before, metric, i), _at(after, metric, i))
-            )
-        if kind == KINDS[-1]:
-            energy = _at(before, ENERGY), _at(after, ENERGY)
-            rows.append(_row(ENERGY, METRICS[ENERGY].unit, *energy))
+            if dof in coupled.get(name.removesuffix('_max'), DOFS):
+                row = {'name': f'{name}.{dof}', 'unit': METRICS[metric].unit_of(i)}
+                rows.append(row | {'before': old and old[i], 'after': new and new[i]})
     return rows
 
 
@@ -122,16 +121,6 @@ def coupled_in(*vehicles: Vehicle) -> dict[str, set[str]]:
     """Degrees of freedom that are deformed in one of some vehicles, for each kind."""
     names = {name for vehicle in vehicles for name in present(vehicle)}
     return {kind: {n.split('.')[1] for n in names if n.startswith(kind)} for kind in KINDS}
-
-
-def _row(name: str, unit: str, before: float | None, after: float | None) -> dict[str, Any]:
-    return {'name': name, 'unit': unit, 'before': before, 'after': after}
-
-
-def _at(summary: Mapping[str, Any], metric: str, i: int | None = None) -> float | None:
-    group, _, name = metric.partition('.')
-    value = summary[group][name]
-    return value if value is None or i is None else value[i]
 
 
 @dataclass(frozen=True, eq=False)

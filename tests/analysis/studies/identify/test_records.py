@@ -31,7 +31,7 @@ from auv_analysis.studies.identify.identify import (
 )
 from auv_analysis.studies.identify.output_error import _lagged, delayed, on_steps
 from auv_analysis.studies.identify.plausibility import too_short
-from auv_analysis.studies.identify.prediction import Prediction, held_of, predict, sizes
+from auv_analysis.studies.identify.prediction import held_of, predict, sizes
 from auv_analysis.studies.identify.record import (
     Record,
     described,
@@ -541,7 +541,7 @@ def test_stretches_that_are_short_are_predicted_as_far_as_they_reach():
 
 def test_an_error_counts_by_its_energy_and_as_a_thousand_at_most():
     errors = np.array([[[1e9, 3.0, np.nan, 0.0, 0.0, -2.0]]])
-    found = sizes(Prediction('x', errors), np.diag([4.0, 8.0, 1.0, 1.0, 1.0, 5.0]))
+    found = sizes(errors, np.diag([4.0, 8.0, 1.0, 1.0, 1.0, 5.0]))
     assert_allclose(found, [[(4e6 + 72.0 + 20.0) / 4.0]])
 
 
@@ -554,7 +554,7 @@ def test_a_prediction_is_compared_at_the_time_of_the_measurement():
         t, q, rest = step * np.arange(n + 1), np.tile(AHEAD, (n + 1, 1)), np.zeros((n + 1, 6))
         held = held_of([Record('x', t, q, t, rest, step, np.tile(push, (n, 1)), 0.0)], 0.6)
         assert held.horizons[0] == 0.1
-        return predict('x', held, vehicle, *as_filed(vehicle)).errors[0]
+        return predict(held, vehicle, *as_filed(vehicle))[0]
 
     assert_allclose(predicted(0.04), predicted(0.02), rtol=0.02)
 
@@ -564,7 +564,7 @@ def test_a_vehicle_as_filed_acts_behind_the_lag_and_the_delay_that_are_given(her
     u, theta = as_filed(vehicle, 0.2, 0.06)
     found = u.coefficients(theta)
     assert (found.lag, found.delay) == (0.2, 0.06)
-    errors = predict('x', held_of([part], HISTORY), vehicle, u, theta).errors[:, 0, :3]
+    errors = predict(held_of([part], HISTORY), vehicle, u, theta)[:, 0, :3]
     first, *_ = compared([part], held_of([part], HISTORY), vehicle, lag=0.2, delay=0.06)
     assert first['predictor'] == 'herman2018'
     assert first['linear'] == pytest.approx(np.sqrt((errors**2).sum(axis=1).mean()))

@@ -8,12 +8,7 @@ import numpy as np
 
 from auv_analysis.output.text import join
 from auv_analysis.studies.identify.identified import Identified
-from auv_analysis.studies.identify.intervals import (
-    Profile,
-    bootstrap,
-    far_from_quadratic,
-    profile,
-)
+from auv_analysis.studies.identify.intervals import bootstrap, far_from_quadratic, profile
 from auv_analysis.studies.identify.output_error import UNSEEN, Fit, OutputError
 from auv_analysis.studies.identify.prediction import (
     BlackBox,
@@ -172,7 +167,10 @@ def identify(
         draws = bootstrap(final, fit, settings.bootstrap, beside)
     if AUTO in settings.profile:
         asked |= set(far_from_quadratic(final, fit, covariance))
-    profiles = _profiles(final, fit, covariance, asked, say)
+    profiles, chosen = [], [name for name in fit.unknowns.names if name in asked]
+    for k, name in enumerate(chosen, start=1):  # ten refits each
+        say(f'profile likelihood {k} of {len(chosen)}: {name}')
+        profiles.append(profile(final, fit, covariance, name))
     say('prediction of what was held out')
     moments = held_of(held, HISTORY)
     rows = compared(training, moments, vehicle, (fit.unknowns, fit.theta))
@@ -243,14 +241,11 @@ def compared(
     """
     if not moments.count:
         return []
-    predictors = [predict('new', moments, vehicle, *model)] if model else []
-    predictors += [
-        predict('prior' if model else vehicle.name, moments, vehicle,
-                *as_filed(vehicle, lag, delay)),
-        persistence(moments),
-        BlackBox(training).predict(moments),
-    ]  # fmt: skip
-    return compare(predictors, moments, vehicle.M)
+    errors = {'new': predict(moments, vehicle, *model)} if model else {}
+    filed = predict(moments, vehicle, *as_filed(vehicle, lag, delay))
+    errors |= {'prior' if model else vehicle.name: filed, 'persistence': persistence(moments)}
+    errors['black box'] = BlackBox(training).predict(moments)
+    return compare(errors, moments, vehicle.M)
 
 
 def as_filed(vehicle: Vehicle, lag: float = 0.0, delay: float = 0.0) -> tuple[Unknowns, np.ndarray]:
@@ -380,18 +375,6 @@ def _with_best_delay(
                 break
             j += way
     return sorted(tried.values(), key=lambda fit: fit.cost)
-
-
-def _profiles(
-    problem: OutputError, fit: Fit, covariance: np.ndarray, asked: set[str], say: Say
-) -> list[Profile]:
-    """Profile likelihoods of those coefficients that are asked for and free."""
-    names = [name for name in fit.unknowns.names if name in asked]
-    found = []
-    for k, name in enumerate(names, start=1):  # ten refits each
-        say(f'profile likelihood {k} of {len(names)}: {name}')
-        found.append(profile(problem, fit, covariance, name))
-    return found
 
 
 def _best_observer(problem: OutputError, u: Unknowns, theta: np.ndarray) -> float:

@@ -32,21 +32,6 @@ SEED = 0
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
-    """Errors of one predictor.
-
-    Attributes
-    ----------
-    name : 'new', 'prior', 'persistence', 'black box'
-    errors : (starts, horizons, 6) predicted less measured velocity, m/s and rad/s; NaN: unknown
-
-    """
-
-    name: str
-    errors: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
 class Held:
     """Moments of recordings from which predictions start.
 
@@ -112,10 +97,8 @@ def held_of(records: Sequence[Record], history: float) -> Held:
     return Held(records, found, horizons, np.concatenate(measured), np.concatenate(blocks))
 
 
-def predict(
-    name: str, held: Held, vehicle: Vehicle, unknowns: Unknowns, theta: np.ndarray
-) -> Prediction:
-    """Prediction by a model."""
+def predict(held: Held, vehicle: Vehicle, unknowns: Unknowns, theta: np.ndarray) -> np.ndarray:
+    """Errors of a model (starts, horizons, 6): predicted less measured; NaN: unknown."""
     found = []
     for record, segments in zip(held.record, held.segments, strict=True):
         if segments:
@@ -128,7 +111,7 @@ def predict(
             every = np.concatenate(states)
             nu = np.nan_to_num(every[..., 7:], nan=DIVERGED)
             found.append(_after(nu, held.horizons / record.step))
-    return Prediction(name, np.concatenate(found) - held.measured)
+    return np.concatenate(found) - held.measured
 
 
 def _after(rows: np.ndarray, steps: np.ndarray) -> np.ndarray:
@@ -140,10 +123,10 @@ def _after(rows: np.ndarray, steps: np.ndarray) -> np.ndarray:
     return rows[:, first] * (1.0 - share) + rows[:, np.ceil(steps).astype(int) - 1] * share
 
 
-def persistence(held: Held) -> Prediction:
-    """The velocity stays as it is."""
+def persistence(held: Held) -> np.ndarray:
+    """Errors, as of `predict`, of a velocity that stays as it is."""
     starts = np.concatenate([[one.start[4:] for one in some] for some in held.segments if some])
-    return Prediction('persistence', starts[:, None] - held.measured)
+    return np.asarray(starts[:, None] - held.measured)
 
 
 class BlackBox:
@@ -173,8 +156,8 @@ class BlackBox:
         inputs = [smoothed_command(middles, record.command, t - lag) for lag in LAGS]
         return np.concatenate([state, *inputs, np.ones((len(t), 1))], axis=1)
 
-    def predict(self, held: Held) -> Prediction:
-        """Its prediction of what was held out."""
+    def predict(self, held: Held) -> np.ndarray:
+        """Its errors, as of `predict`."""
         found = []
         for record, segments in zip(held.record, held.segments, strict=True):
             t = np.array([one.begin for one in segments])
@@ -190,7 +173,7 @@ class BlackBox:
             rows = np.array(path)
             mixed = rows[first] * (1 - share) + rows[first + 1] * share
             found.append(mixed[..., :6].swapaxes(0, 1))
-        return Prediction('black box', np.concatenate(found) - held.measured)
+        return np.asarray(np.concatenate(found) - held.measured)
 
 
 def smoothed_command(t: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -204,14 +187,20 @@ def smoothed_command(t: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndar
     return (ahead - behind) / BOX_STEP
 
 
-def sizes(prediction: Prediction, M: np.ndarray) -> np.ndarray:
+def sizes(errors: np.ndarray, M: np.ndarray) -> np.ndarray:
     """Squared error (starts, horizons) by kinetic energy, (m/s)2; unknown velocities count not."""
-    e = np.nan_to_num(np.clip(prediction.errors, -DIVERGED, DIVERGED), nan=0.0)
+    e = np.nan_to_num(np.clip(errors, -DIVERGED, DIVERGED), nan=0.0)
     return np.einsum('shi,ij,shj->sh', e, M, e) / M[0, 0]
 
 
-def compare(predictions: Sequence[Prediction], held: Held, M: np.ndarray) -> list[dict[str, Any]]:
+def compare(errors: Mapping[str, np.ndarray], held: Held, M: np.ndarray) -> list[dict[str, Any]]:
     """Root mean square errors by horizon, and how the first differs from each of the others.
+
+    Parameters
+    ----------
+    errors : name of a predictor -> its errors, as of `predict`
+    held : what is predicted
+    M : (6, 6) that weighs them
 
     Returns
     -------
@@ -225,23 +214,22 @@ def compare(predictions: Sequence[Prediction], held: Held, M: np.ndarray) -> lis
     picks = rng.integers(len(numbers), size=(DRAWS, len(numbers)))
     counts = np.stack([np.bincount(pick, minlength=len(numbers)) for pick in picks])
     sums = {
-        p.name: np.stack([np.bincount(index, column) for column in sizes(p, M).T]).T
-        for p in predictions
+        name: np.stack([np.bincount(index, column) for column in sizes(e, M).T]).T
+        for name, e in errors.items()
     }
-    first, rows = predictions[0], []
-    for p in predictions:
+    first, rows = next(iter(sums.values())), []
+    for (name, e), own in zip(errors.items(), sums.values(), strict=True):
         with np.errstate(all='ignore'):
-            e = p.errors
-            drawn = counts @ sums[first.name] / np.maximum(counts @ sums[p.name], 1e-300)
+            drawn = counts @ first / np.maximum(counts @ own, 1e-300)
         for h, horizon in enumerate(held.horizons):
             low, high = np.sqrt(np.quantile(drawn[:, h], [0.025, 0.975]))
-            other = p is not first
-            ratio = np.sqrt(sums[first.name][:, h].sum() / max(sums[p.name][:, h].sum(), 1e-300))
+            other = own is not first
+            ratio = np.sqrt(first[:, h].sum() / max(own[:, h].sum(), 1e-300))
             rows.append(
                 {
-                    'predictor': p.name,
+                    'predictor': name,
                     'horizon': float(horizon),
-                    'error': float(np.sqrt(sums[p.name][:, h].sum() / held.count)),
+                    'error': float(np.sqrt(own[:, h].sum() / held.count)),
                     'linear': _rms(e[:, h, :3]),
                     'angular': _rms(e[:, h, 3:]),
                     'ratio': float(ratio) if other else None,

@@ -77,32 +77,17 @@ class Identified:
         for k, entry in enumerate(u.entries):
             left = float(alone[k] / before[k])
             is_known = left < KNOWN
-            interval = (values[k] - half[k], values[k] + half[k]) if is_known else (None, None)
-            rows.append(
-                {
-                    'name': entry.name,
-                    'unit': entry.si,
-                    'prior': float(prior[k]),
-                    'value': float(values[k]),
-                    'deviation': float(after[k]) if is_known else None,
-                    'low': interval[0],
-                    'high': interval[1],
-                    'left': left,
-                    'status': 'identified' if is_known else 'prior',
-                }
-            )
-        rows += [
-            {'name': entry.name, 'unit': entry.si, 'value': 0.0, 'deviation': None,
-             'low': None if high is None else 0.0, 'high': high, 'left': None, 'status': 'at zero',
-             'prior': float(getattr(self.vehicle, entry.group)[entry.index])}
-            for entry, high in self.zeros.items()
-        ]  # fmt: skip
-        rows += [
-            {'name': entry.name, 'unit': entry.si, 'prior': value, 'value': value, 'left': 1.0,
-             'deviation': None, 'low': None, 'high': None, 'status': 'prior'}
-            for entry in self.still
-            for value in [float(getattr(self.found, entry.group)[entry.index])]
-        ]  # fmt: skip
+            ends = {'low': values[k] - half[k], 'high': values[k] + half[k]}
+            interval = {'deviation': float(after[k]), **ends} if is_known else {}
+            status = 'identified' if is_known else 'prior'
+            rows.append(_row(entry, prior[k], values[k], status, left=left, **interval))
+        for entry, high in self.zeros.items():
+            filed = getattr(self.vehicle, entry.group)[entry.index]
+            low = None if high is None else 0.0
+            rows.append(_row(entry, filed, 0.0, 'at zero', low=low, high=high))
+        for entry in self.still:
+            value = getattr(self.found, entry.group)[entry.index]
+            rows.append(_row(entry, value, value, 'prior', left=1.0))
         if u.is_delay_free:
             rows.append(self._delay(all(r['low'] is not None for r in rows if r['name'] == 'lag')))
         for row in rows:
@@ -129,14 +114,12 @@ class Identified:
 
     def _delay(self, is_known: bool) -> dict[str, Any]:
         """The delay, found in whole steps; known where the lag is, beside which it is told."""
-        value = float(self.fit.unknowns.prior.delay)
-        step = self.problem.step
-        return {
-            'name': 'delay', 'unit': 's', 'prior': 0.0, 'value': value, 'deviation': None,
-            'low': max(value - 2 * step, 0.0) if is_known else None,
-            'high': value + 2 * step if is_known else None, 'left': None,
-            'status': 'identified' if is_known else 'prior',
-        }  # fmt: skip
+        value, wide = float(self.fit.unknowns.prior.delay), 2 * self.problem.step
+        entry = Entry('delay', (), 'delay', 0.0, 's')
+        if not is_known:
+            return _row(entry, 0.0, value, 'prior')
+        ends = {'low': max(value - wide, 0.0), 'high': value + wide}
+        return _row(entry, 0.0, value, 'identified', **ends)
 
     def combinations(self) -> list[dict[str, Any]]:
         """What the data cannot tell: `left` of the prior's deviation, and in words which."""
@@ -184,6 +167,16 @@ class Identified:
         root = np.linalg.cholesky(self.covariance + least * np.eye(len(self.covariance)))
         moves = scale * rng.standard_normal((count, len(root))) @ root.T
         return self.fit.unknowns.coefficients(self.fit.theta + np.clip(moves, -FARTHEST, FARTHEST))
+
+
+def _row(
+    entry: Entry, prior: float, value: float, status: str, **known: float | None
+) -> dict[str, Any]:
+    """Row of `coefficients`; what is not given is not known."""
+    return {
+        'name': entry.name, 'unit': entry.si, 'prior': float(prior), 'value': float(value),
+        **dict.fromkeys(('deviation', 'low', 'high', 'left')), 'status': status, **known,
+    }  # fmt: skip
 
 
 def _words(names: Sequence[str], part: np.ndarray, some: Sequence[int]) -> str:

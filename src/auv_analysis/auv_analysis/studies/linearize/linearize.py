@@ -81,8 +81,8 @@ class Linearization:
             for named in (self.states, self.inputs, self.outputs)
         )
         states, inputs, outputs = groups
-        poles = np.sort_complex(np.linalg.eigvals(self.A))[::-1]
-        shown = ', '.join(_number(pole) for pole in poles if pole.imag >= 0)
+        poles = np.round(np.sort_complex(np.linalg.eigvals(self.A))[::-1], 9) + 0.0
+        shown = ', '.join(pole_text(pole.real, pole.imag) for pole in poles if pole.imag >= 0)
         return (
             f'<Linearization: A {self.A.shape}, B {self.B.shape}, C {self.C.shape}'
             f'\n states: {states}; inputs: {inputs}; outputs: {outputs}'
@@ -109,9 +109,9 @@ class Linearization:
         )
 
 
-def _number(pole: complex) -> str:
-    real = f'{round(pole.real, 9) + 0.0:.4g}'
-    return f'{real} ± {pole.imag:.4g}i' if pole.imag > 1e-9 else real
+def pole_text(real: float, imaginary: float) -> str:
+    """A pole, and with it the one that is conjugate."""
+    return f'{real:.4g}' + (f' ± {imaginary:.4g}i' if imaginary else '')
 
 
 def _places(named: Sequence[str], groups: Sequence[str], what: str) -> list[int]:

@@ -11,7 +11,7 @@ from auv_analysis.output.progress import TextConsole
 from auv_analysis.output.text import number, plain
 from auv_analysis.report.results import Results, Shown, described, make_table, terminal
 from auv_analysis.scenario.scenario import Scenario
-from auv_analysis.studies.linearize.linearize import Linearization, linearize
+from auv_analysis.studies.linearize.linearize import Linearization, linearize, pole_text
 from auv_dynamics.vehicle.vehicle import Vehicle
 
 STABLE, MARGINAL, UNSTABLE = 'asymptotically stable', 'marginal', 'unstable'
@@ -202,11 +202,7 @@ def print_poles(document: dict[str, Any], out: Console | None = None) -> None:
 
 def pole_rows(found: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Modes with the text of each pole, a conjugate pair as one."""
-    return [{**mode, 'pole': _text(*mode['pole'])} for mode in found]
-
-
-def _text(real: float, imaginary: float) -> str:
-    return f'{real:.4g}' + (f' ± {imaginary:.4g}i' if imaginary else '')
+    return [{**mode, 'pole': pole_text(*mode['pole'])} for mode in found]
 
 
 def _verdict(model: dict[str, Any]) -> str:

@@ -19,6 +19,7 @@ from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.vehicle.vehicle_file import SCHEMA as VEHICLE_SCHEMA
 
 VEHICLE = 'vehicle'
+INSIDE = f'{VEHICLE}.'  # begins a path into the vehicle file
 KEY = r"(?:^|(?<=.)\.)(?:([^.\[\]'\s]+)|'([^']+)')"
 PART = re.compile(rf'{KEY}|\[(0|[1-9]\d{{0,8}})\]')
 UNIT = re.compile(r'\(([^()]+)\)$')  # ends a title: 'a positive number (kg)'
@@ -138,8 +139,8 @@ def changed_scenario(scenario: Scenario, values: Mapping[str, Any]) -> Scenario:
         elif path == VEHICLE:
             vehicle_path = vehicle_path_of(str(value), scenario.path)
             data, vehicle = {**data, VEHICLE: str(value)}, read_yaml(vehicle_path, 'vehicle')
-        elif of_vehicle(path):
-            vehicle = changed(vehicle, below_vehicle(path), value, vehicle_path)
+        elif path.startswith(INSIDE):
+            vehicle = changed(vehicle, path.removeprefix(INSIDE), value, vehicle_path)
         else:
             data = changed(data, path, value, scenario.path)
     texts = _from_file(data, scenario)
@@ -156,16 +157,6 @@ def _from_file(data: dict[str, Any], scenario: Scenario) -> dict[str, str]:
     csv = scenario.path.parent / file
     data['setpoint'] = {**data['setpoint'], 'file': str(csv.resolve())}
     return {'setpoint.csv': read_text(csv, 'CSV set-point')}
-
-
-def of_vehicle(path: str) -> bool:
-    """Whether a path leads into the vehicle file."""
-    return path.startswith(f'{VEHICLE}.')
-
-
-def below_vehicle(path: str) -> str:
-    """Path within the vehicle file."""
-    return path.removeprefix(f'{VEHICLE}.')
 
 
 def check_paths(scenario: Scenario, paths: Iterable[str]) -> None:
@@ -214,8 +205,8 @@ def _nodes_of(
     data: Any, vehicle: Any, path: str, file: object = 'scenario', vehicle_file: object = 'vehicle'
 ) -> list[dict[str, Any]]:
     """What the schemas say of the entry at a path; InputError where nothing can stand there."""
-    if of_vehicle(path):
-        return _nodes_at(schema(VEHICLE_SCHEMA), vehicle, split(below_vehicle(path)), vehicle_file)
+    if path.startswith(INSIDE):
+        return _nodes_at(schema(VEHICLE_SCHEMA), vehicle, split(path)[1:], vehicle_file)
     return _nodes_at(schema(SCHEMA), data, split(path), file)
 
 
@@ -239,14 +230,13 @@ def _nodes_at(root: dict[str, Any], data: Any, parts: Parts, file: object) -> li
             if part not in known:
                 expected = one_of(part, known) if known else 'a single value'
                 raise InputError(file, dotted(parts[: depth + 1]), expected, part)
-            below = [_property(node, part) for node in nodes]
+            below = [
+                node.get('properties', {}).get(part, node.get('additionalProperties'))
+                for node in nodes
+            ]
             data = data.get(part)
         nodes = [node for inner in below for node in _applicable(inner, data)]
     return nodes
-
-
-def _property(node: Mapping[str, Any], key: str) -> Any:
-    return node.get('properties', {}).get(key, node.get('additionalProperties'))
 
 
 def _applicable(node: Any, data: Any) -> Iterator[dict[str, Any]]:

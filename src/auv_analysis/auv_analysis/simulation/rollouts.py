@@ -183,14 +183,10 @@ def _of_scenario(
             alone = changed_scenario(scenario, single)
             alone.controller(controller)
         except InputError as error:
-            reasons[i] = _reason(error)
+            reasons[i] = f'{error.key}: expected {error.expected}, found {error.found}'
             continue
         seed = np.array([alone.data['seed']])
         yield packed_variants(alone, controller, {}, np.array([i]), seed)[0]
-
-
-def _reason(error: InputError) -> str:
-    return f'{error.key}: expected {error.expected}, found {error.found}'
 
 
 def batch_of(variants: Variants, hold: Hold) -> Batch:

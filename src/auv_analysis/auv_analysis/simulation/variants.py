@@ -285,16 +285,11 @@ def _gains(
     gains = law(**fields)
     if hasattr(law, 'check'):
         for i in np.flatnonzero(good):
-            good[i] = _accepted(law, law(*(v[i if len(v) > 1 else 0] for v in gains)))
+            try:
+                law.check(law(*(v[i if len(v) > 1 else 0] for v in gains)))
+            except ValueError:
+                good[i] = False
     return gains
-
-
-def _accepted(law: Any, gains: Any) -> bool:
-    try:
-        law.check(gains)
-    except ValueError:
-        return False
-    return True
 
 
 def _definite(vehicle: Vehicle, good: np.ndarray) -> dict[str, np.ndarray]:

@@ -1,8 +1,9 @@
 """The folder of a sweep, opened to be read column by column."""
 
 import json
+import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -20,7 +21,7 @@ from auv_analysis.output.text import plain
 from auv_analysis.scenario.changes import said_of
 from auv_analysis.studies.sweep.campaign import concerns, of_controller
 from auv_analysis.studies.sweep.variation import kind_of
-from auv_dynamics.files.errors import InputError, first_line, reason, shorten
+from auv_dynamics.files.errors import InputError, first_line, refusing, shorten
 
 if TYPE_CHECKING:
     import pyarrow.dataset as ds
@@ -142,11 +143,8 @@ class Sweep:
 
     def spread_of(self, path: str) -> tuple[str, Any]:
         """Kind of a path's group and what the campaign says of it."""
-        for spec in self.campaign['vary']:
-            kind = kind_of(spec)
-            if path in spec[kind]:
-                return kind, spec[kind][path]
-        raise KeyError(path)
+        kinds = ((kind_of(spec), spec) for spec in self.campaign['vary'])
+        return next((kind, spec[kind][path]) for kind, spec in kinds if path in spec[kind])
 
 
 def numbers_of(table: pa.Table, column: str) -> np.ndarray:
@@ -167,7 +165,9 @@ def open_sweep(folder: Path) -> Sweep:
 
     """
     manifest = _manifest(folder / SWEEP)
-    parts = sorted(_parts(folder / ROLLOUTS))
+    with refusing(folder / ROLLOUTS, '', 'the rows of a sweep'):
+        files = (folder / ROLLOUTS).iterdir()
+        parts = sorted(path for path in files if PART.fullmatch(path.name))
     if not parts:
         expected = 'finished blocks of a sweep'
         raise InputError(folder / ROLLOUTS, '', expected, 'no part-*.parquet')
@@ -177,19 +177,11 @@ def open_sweep(folder: Path) -> Sweep:
     return Sweep(folder, manifest, parts, rows)
 
 
-def _parts(folder: Path) -> Iterator[Path]:
-    try:
-        yield from (path for path in folder.iterdir() if PART.fullmatch(path.name))
-    except OSError as error:
-        raise InputError(folder, '', 'the rows of a sweep', reason(error)) from None
-
-
 def _manifest(path: Path) -> dict[str, Any]:
     try:
-        manifest = json.loads(path.read_text(encoding='utf-8'))
-    except OSError as error:
-        raise InputError(path, '', 'the manifest of a sweep', reason(error)) from None
-    except ValueError:
+        with refusing(path, '', 'the manifest of a sweep'):
+            manifest = json.loads(path.read_text(encoding='utf-8'))
+    except (json.JSONDecodeError, UnicodeDecodeError):
         raise InputError(path, '', 'the manifest of a sweep', 'no JSON') from None
     try:
         campaign = manifest['campaign']
@@ -349,21 +341,14 @@ def _categories(column: pa.ChunkedArray) -> tuple[np.ndarray, list[str]]:
     return codes, [f'{i}: {name}' if count[name] > 1 else name for i, name in enumerate(names, 1)]
 
 
-PREFIXES = ('controllers.*.', 'vehicle.', 'setpoint.', 'controllers.')
+PREFIX = re.compile(r'^(controllers\.(\*\.)?|vehicle\.|setpoint\.)')
 
 
 def short_names(factor: Sequence[Factor]) -> dict[str, str]:
     """Path -> its name without where it is from, as long as that tells it from the others."""
-    short = {v.path: _short(v.path) for v in factor}
+    short = {v.path: PREFIX.sub('', v.path) for v in factor}
     names = list(short.values())
     return {path: name if names.count(name) == 1 else path for path, name in short.items()}
-
-
-def _short(path: str) -> str:
-    for prefix in PREFIXES:
-        if path.startswith(prefix):
-            return path.removeprefix(prefix)
-    return path
 
 
 def with_unit(name: str, factor: Factor) -> str:

@@ -180,6 +180,9 @@ def write_report(out: Path, analysis: Analysis, figures: Mapping[str, FigureReco
 
     Parameters
     ----------
+    rows, caption = analysis.counts(), 'Rows of each controller.'
+    counts = _of_document('counts', 'controllers', caption, rows, shown=COUNTS)
+
     out : folder, existing, with what `results_of` writes
     analysis : of `analysed`
     figures : of `draw`
@@ -192,8 +195,7 @@ def write_report(out: Path, analysis: Analysis, figures: Mapping[str, FigureReco
         return [figures[name] for name in names if name in figures]
 
     sections = [
-        Section('campaign', 'What was swept', [_paths(analysis), _counts(analysis),
-                                               *analysis.notes]),
+        Section('campaign', 'What was swept', [_paths(analysis), counts, *analysis.notes]),
         Section('distributions', 'Distributions', [
             *shown('distributions'), *([_spreads(analysis)] if analysis.measures else [])]),
         Section('controllers', 'Controllers against each other',
@@ -243,11 +245,6 @@ def _named(analysis: Analysis, row: Row) -> Row:
     names = short_names(analysis.factors)
     found = {**row, 'figure': BY_NAME[row['figure']].label, 'path': names[row['path']]}
     return found | ({'with': names.get(row['with'] or '', '')} if 'with' in row else {})
-
-
-def _counts(analysis: Analysis) -> Table:
-    caption = 'Rows of each controller.'
-    return _of_document('counts', 'controllers', caption, analysis.counts(), shown=COUNTS)
 
 
 def _paths(analysis: Analysis) -> Table:

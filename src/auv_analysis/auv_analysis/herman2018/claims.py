@@ -327,15 +327,7 @@ TITLE = 'What the paper reports, and what these runs give'
 
 
 def claims_part(out: Path, claims: Sequence[Claim], runs: Mapping[str, RunInfo]) -> Part:
-    """Section and sentences of a report on the claims; writes `claims.parquet` where there are any.
-
-    Parameters
-    ----------
-    out : folder of the report
-    claims : of `judge_runs` or of a study
-    runs : that the report is about, by name
-
-    """
+    """Section and sentences on the claims; writes `claims.parquet` where there are any."""
     sections = []
     if claims:
         write_claims(out, claims)

@@ -20,13 +20,7 @@ def moved_setpoints(scenario: Scenario) -> list[int]:
 
 
 def setpoint_changes(scenario: Scenario) -> list[dict[str, float]]:
-    """Changes for `changed_scenario`: nothing first, then each set-point times `STEP`.
-
-    Parameters
-    ----------
-    scenario : whose set-points are sums of sinusoids, not a file
-
-    """
+    """Changes for `changed_scenario`: nothing first, then each set-point times `STEP`."""
     each = [_numbers(scenario, DOFS[i]) for i in moved_setpoints(scenario)]
     return [{}, *({path: STEP * value for path, value in numbers.items()} for numbers in each)]
 
@@ -70,13 +64,7 @@ def response(
 ) -> ErrorSensitivity | None:
     """What the RMS errors of a controller follow; None where its loops do not all run.
 
-    Parameters
-    ----------
-    scenario : whose set-points are sums of sinusoids
-    controller : name of one of its controllers
-    found : its sensitivity to the gains
-    hold : as of `simulate`
-
+    The set-points are sums of sinusoids; `found` is its sensitivity to the gains.
     """
     if found.refusal:
         return None

@@ -24,15 +24,7 @@ OF_THE_MOTION = ('model_error', 'current')  # kinds of disturbance whose F depen
 
 
 def applicability(law: str, gains: Any, model: ControlModel) -> str:
-    """Why a law with its gains has no certificate, in plain words; '' when it has one.
-
-    Parameters
-    ----------
-    law : its name
-    gains : its named tuple, None where not known
-    model : what the law knows of the vehicle
-
-    """
+    """Why a law with its gains, None where not known, has no certificate; '' when it has one."""
     if law not in LAWS:
         return f'no certificate of the law {law} is known: (23) to (28) are those of gvc and cl'
     if gains is None:

@@ -92,17 +92,7 @@ def described(column: str) -> tuple[str, str, str]:
 
 
 def flat(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Columns of a run from its summary; matrices go entry by entry.
-
-    Parameters
-    ----------
-    summary : of `summarize`
-
-    Returns
-    -------
-    columns : name -> number, word, truth or None; then those of `MEASURES`
-
-    """
+    """Columns of a run from its summary, then those of `MEASURES`; matrices go entry by entry."""
     found: dict[str, Any] = {}
     for key, value in summary.items():
         found |= _columns(key, value)

@@ -261,14 +261,7 @@ def _sampling(M: np.ndarray) -> dict[str, dict[str, Any]]:
 
 
 def print_check(document: dict[str, Any], out: Console | None = None) -> None:
-    """Print what `check_vehicle` found.
-
-    Parameters
-    ----------
-    document : of `check_vehicle`
-    out : none: standard output
-
-    """
+    """Print what `check_vehicle` found; default: on standard output."""
     out = out or TextConsole(highlight=False)
     _say(out, f'{document["name"]}: {document["source"] or "no source is given"}')
     _inertia(document, out)

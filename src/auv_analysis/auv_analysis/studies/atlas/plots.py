@@ -31,14 +31,7 @@ KINDS = {'delta_xi': ('Δξ', VELOCITY), 'delta_pi': ('Δπ', WRENCH)}
 
 
 def draw(charts: Sequence[Chart], folder: Path) -> dict[str, FigureRecord]:
-    """Draw the figures of an atlas as PNG and PDF: name -> figure.
-
-    Parameters
-    ----------
-    charts : of `charts`
-    folder : where the files go; made when it is not there
-
-    """
+    """Draw the figures of an atlas as PNG and PDF: name -> figure; the folder is made."""
     drawn: dict[str, Callable[[], Drawn]] = {
         'strength': lambda: _strength(charts),
         'correlation': lambda: _correlation(charts),

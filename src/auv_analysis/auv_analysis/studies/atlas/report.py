@@ -33,15 +33,7 @@ SHARES = Maths(
 
 
 def write_report(out: Path, charts: Sequence[Chart], figures: Mapping[str, FigureRecord]) -> Path:
-    """Write report.html of an atlas; returns its path.
-
-    Parameters
-    ----------
-    out : folder, existing
-    charts : of `charts`
-    figures : of `draw`
-
-    """
+    """Write report.html of an atlas into an existing folder; returns its path."""
     results = results_of(charts)
     sections = [
         Section('strength', 'Strength', [

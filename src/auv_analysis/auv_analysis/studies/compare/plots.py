@@ -39,16 +39,7 @@ MARKS = 'pale 0: exactly zero; crossed out: there is none'
 def draw(
     entries: Sequence[Entry], table: pa.Table, ranking: Ranking, folder: Path
 ) -> dict[str, FigureRecord]:
-    """Draw the plots of a comparison as PNG and PDF: name -> plot.
-
-    Parameters
-    ----------
-    entries : its runs, of which one at least did not diverge
-    table : of `comparison_table`
-    ranking : of `rank`
-    folder : where the files go; made when it is not there
-
-    """
+    """Draw the plots of runs, one of which did not diverge, as PNG and PDF: name -> plot."""
     drawn: dict[str, Callable[[], Drawn]] = {
         'ranking': partial(_ranking, ranking),
         'errors': partial(errors, entries),

@@ -93,18 +93,9 @@ def _entry(source: RunSource, vehicle: str | None) -> Entry:
 
 
 def conclude_comparison(out: Path, entries: Sequence[Entry], *, report: bool) -> dict[str, Any]:
-    """Write summary.json, table, plots and report.
+    """Write summary.json, table and, where asked for, plots and report.
 
-    Parameters
-    ----------
-    out : folder, prepared
-    entries : of `entries_of`
-    report : whether there is a report, with its plots
-
-    Returns
-    -------
-    summaries : name -> summary, None of a run that diverged
-
+    Returns name -> summary, None of a run that diverged.
     """
     summaries = {entry.name: entry.summary or None for entry in entries}
     write_json(out / 'summary.json', summaries)
@@ -127,14 +118,7 @@ def write_comparison(
     table: pa.Table,
     figures: Mapping[str, FigureRecord],
 ) -> Path:
-    """Write report.html of a comparison; returns its path.
-
-    Parameters
-    ----------
-    out : folder, existing
-    entries, table, figures : of the same runs
-
-    """
+    """Write report.html of a comparison into an existing folder; returns its path."""
     energy: list[Block] = [six_table(table, SHARES), figures['kinetic_energy']]
     sections = [
         Section('overview', 'All runs', [overview(table), figures['ranking'], figures['errors']]),
@@ -185,13 +169,7 @@ def _six_columns(family: str, group: str = '') -> dict[str, Any]:
 
 
 def findings(entries: Sequence[Entry], rows: Rows) -> list[Sentence]:
-    """Sentences of the summary: who settles, what differs, what cannot be compared.
-
-    Parameters
-    ----------
-    entries, rows : of the same runs
-
-    """
+    """Sentences of the summary: who settles, what differs, what cannot be compared."""
     known = [row for row in rows if not row['failure']]
     found = [_settled(known), _differing(known), _diverged(rows)]
     found += namesakes([entry.digest for entry in entries if entry.digest])

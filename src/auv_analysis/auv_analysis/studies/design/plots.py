@@ -21,14 +21,7 @@ SYMBOLS = {'delta_xi': r'\Delta\xi', 'delta_pi': r'\Delta\pi'}
 
 
 def draw_design(result: DesignStudy, folder: Path) -> dict[str, FigureRecord]:
-    """Draw a design as PNG and PDF; nothing where there was nothing to reduce.
-
-    Parameters
-    ----------
-    result : of `concluded`
-    folder : where the files go; made when it is not there
-
-    """
+    """Draw a design as PNG and PDF; nothing where there was nothing to reduce."""
     if not result.simulated:
         return {}
     main = result.document['controller']

@@ -61,14 +61,7 @@ METHOD = tuple(
 
 
 def write_report(result: DesignStudy, out: Path) -> Path:
-    """Write report.html with its figures and numbers.parquet; returns the report's path.
-
-    Parameters
-    ----------
-    result : of `concluded`
-    out : its folder
-
-    """
+    """Write report.html with its figures and numbers.parquet; returns the path of the report."""
     document = result.document
     figures = draw_design(result, out / 'figures')
     listings = [

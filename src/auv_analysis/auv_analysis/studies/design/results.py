@@ -143,16 +143,8 @@ class DesignStudy:
 def write_results(found: Proposal, results: ResultsFolder) -> DesignStudy:
     """Write the changed vehicle and its scenario, run both vehicles, write the figures.
 
-    Parameters
-    ----------
-    found : of `propose`
-    results : where to write, and the folder that the document names
-
-    Returns
-    -------
-    design : its document also stands in design.json; the runs after the change are those of the
-        scenario and the vehicle as they were read back from the folder
-
+    The document also stands in design.json; the runs after the change are those of the scenario and
+    the vehicle as they were read back from the folder.
     """
     setting, out = found.setting, results.folder
     x, target = (None, '') if found.best is None else (found.best.x, COUPLINGS[found.best.target])
@@ -317,17 +309,7 @@ def nothing_statement(vehicle: str, target: str | None, there: Sequence[str]) ->
 def result_statement(
     target: int, before: float, best: Candidate | None, words: Sequence[str], by: str
 ) -> str:
-    """What the proposal does to the coupling, by simulation.
-
-    Parameters
-    ----------
-    target : place in `COUPLINGS`
-    before : largest magnitude
-    best : the proposal; none: there is none
-    words : of the proposal
-    by : controller and hold of the run
-
-    """
+    """What the proposal does to the coupling, by simulation; `before` is its largest magnitude."""
     name, unit = COUPLINGS[target], UNITS[COUPLINGS[target]]
     if best is None or best.ratio is None:
         return f'No change within the bounds lowers {name}, which is {number(before)} {unit}, {by}.'

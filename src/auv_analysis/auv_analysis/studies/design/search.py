@@ -184,14 +184,7 @@ class Remedies:
         return [int(k) for k in order[:MOST] if shares[k] > SMALLEST * shares.max()]
 
     def candidates(self, target: int, starts: int) -> Iterator[Candidate]:
-        """The best change of each part and of all together, each simulated.
-
-        Parameters
-        ----------
-        target : place in `COUPLINGS`
-        starts : of each search
-
-        """
+        """The best change of each part and of all for a place in `COUPLINGS`, each simulated."""
         objective = Objective(self.prediction, target)
         singles = []
         for part in PARTS:

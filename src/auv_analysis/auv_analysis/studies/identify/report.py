@@ -48,12 +48,7 @@ METHOD = (
 def results_of(found: Identified, notes: Sequence[str], *, accepted: bool = False) -> Results:
     """All numbers of an identification, and what they say.
 
-    Parameters
-    ----------
-    found : the result
-    notes : what was worth saying about the recordings
-    accepted : whether there is a vehicle file even if something contradicts it
-
+    `accepted`: whether there is a vehicle file even if something contradicts it.
     """
     rows, tables = found.coefficients(), couplings(found)
     wrong = contradictions(found)

@@ -27,12 +27,7 @@ SECTIONS = {
 def vehicle_text(found: Identified, data: Mapping[str, Any], name: str, source: str) -> str:
     """Text of the vehicle file, every section with the provenance of its numbers in comments.
 
-    Parameters
-    ----------
-    found : the result
-    data : contents of the prior's file
-    name, source : of the new one
-
+    `data` are the contents of the file of the prior; name and source are those of the new one.
     """
     prior, rows = found.vehicle, found.coefficients()
     new = with_vehicle(prior, found.found)

@@ -89,12 +89,7 @@ def _stored(of: Sensitivity) -> Iterator[Row]:
 
 
 def sensitivity_table(found: Sequence[Sensitivity], controller: str) -> Table:
-    """Every KPI of a controller by falling spread, with the gains that move it.
-
-    Parameters
-    ----------
-    found : of all controllers, as in the file
-    controller : one that has no refusal
+    """Every KPI of a controller without a refusal by falling spread, with the gains that move it.
 
     """
     stored = enumerate(row for of in found for row in _stored(of))
@@ -250,18 +245,7 @@ GAINS = (
 
 
 def sensitivity_section(out: Path, found: Sequence[Sensitivity]) -> Part:
-    """Section on the gains; writes `sensitivity.parquet` and the figures.
-
-    Parameters
-    ----------
-    out : folder of the study
-    found : one of each controller
-
-    Returns
-    -------
-    section, sentences : the section, and what the summary says
-
-    """
+    """Section on the gains, and what the summary says; writes `sensitivity.parquet` and figures."""
     write_sensitivities(out, found)
     sentences = sensitivity_sentences(found)
     blocks = [GAINS, *sentences, *_of_controllers(out, found)]

@@ -300,14 +300,7 @@ class Analysis:
 
 
 def analysed(sweep: Sweep, by: str = BEST_BY) -> Analysis:
-    """Everything that is reported of a sweep.
-
-    Parameters
-    ----------
-    sweep : of `open_sweep`
-    by : measure that sorts the best rows
-
-    """
+    """Everything that is reported of a sweep; `by` is the measure that sorts the best rows."""
     analysis = Analysis(sweep, factors_of(sweep), {name: [] for name in TABLES})
     groups, notes = designed(sweep)
     analysis.notes = [

@@ -35,14 +35,7 @@ PREFERRED = (
 
 
 def draw(analysis: Analysis, folder: Path) -> dict[str, FigureRecord]:
-    """Draw the plots that the rows of a sweep allow, as PNG and PDF: name -> plot.
-
-    Parameters
-    ----------
-    analysis : of `analysed`
-    folder : where the files go; made when it is not there
-
-    """
+    """Draw the plots that the rows of a sweep allow, as PNG and PDF: name -> plot."""
     chosen, tables = main_measures(analysis), analysis.tables
     drawn: dict[str, Callable[[], Drawn]] = {}
     if analysis.measures:

@@ -145,13 +145,7 @@ def measures_of(cost: Cost, samples: int, step: float) -> Measures:
 
 
 def measures_of_run(run: Run) -> Measures:
-    """The same measures (1,) from the samples of a run, with M and its inverse as they stand.
-
-    Parameters
-    ----------
-    run : of `simulate`
-
-    """
+    """The same measures (1,) from the samples of a run, with M and its inverse as they stand."""
     M = run.vehicle.M
     error, tau, k = run.nu_d - run.nu, run.tau_applied, np.arange(len(run.t))
     energy = 0.5 * np.einsum('ni,ij,nj->n', error, M, error)

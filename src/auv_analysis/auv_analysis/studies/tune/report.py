@@ -61,14 +61,7 @@ SPREADS = {
 
 
 def write_report(tuning: Tuning, out: Path) -> None:
-    """Write tune.json, search.parquet, monte_carlo.parquet and report.html with its figures.
-
-    Parameters
-    ----------
-    tuning : of `tune`
-    out : its folder, with scenario.yaml
-
-    """
+    """Write tune.json, search.parquet, monte_carlo.parquet and report.html with its figures."""
     results = tuning.results
     sentences = [*findings(tuning)]
     results.facts['verdict'] = [{'text': s.text, 'source': s.source} for s in sentences]

@@ -202,20 +202,10 @@ def structures_of(structure: str) -> tuple[str, ...]:
 def tuned(
     request: Request, law: str, goal: Goal, progress: Callable[[], None] = lambda: None
 ) -> TunedLaw:
-    """Tune one law.
+    """Tune one law; the goal is that of the request.
 
-    Parameters
-    ----------
-    request : what is asked
-    law : key of `SHIPPED`
-    goal : of the request
-    progress : called after each structure
-
-    Returns
-    -------
-    tuned : the best of its structures: of those that reach equality the one with the least
-        objective, else the one nearest to equality
-
+    The best of its structures is, of those that reach equality, the one with the least objective,
+    else the one nearest to equality. `progress` is called after each structure.
     """
     scenario = request.scenario
     model = control_model(scenario.vehicle)

@@ -176,20 +176,12 @@ def _show(analysis: Analysis) -> None:
 
 
 def write_report(out: Path, analysis: Analysis, figures: Mapping[str, FigureRecord]) -> Path:
-    """Write report.html of a sweep; returns its path.
-
-    Parameters
-    ----------
-    rows, caption = analysis.counts(), 'Rows of each controller.'
-    counts = _of_document('counts', 'controllers', caption, rows, shown=COUNTS)
-
-    out : folder, existing, with what `results_of` writes
-    analysis : of `analysed`
-    figures : of `draw`
-
-    """
+    """Write report.html of a sweep beside what `results_of` has written; returns its path."""
     sweep, tables = analysis.sweep, analysis.tables
     depends = [figure for name, figure in figures.items() if name.startswith('dependence_')]
+
+    rows, caption = analysis.counts(), 'Rows of each controller.'
+    counts = _of_document('counts', 'controllers', caption, rows, shown=COUNTS)
 
     def shown(*names: str) -> list[Block]:
         return [figures[name] for name in names if name in figures]

@@ -53,16 +53,12 @@ class Quotes:
 
         """
         value = float(value)
-        self._keep(Value(name, value if isfinite(value) else None, unit))
+        entry = Value(name, value if isfinite(value) else None, unit)
+        if (known := self._values.setdefault(name, entry)) != entry:  # shown twice, it stands once
+            raise ValueError(f'expected one value of {name}, found {known} and {entry}')
         if not isfinite(value):
             return UNBOUNDED
         return number(value, text) if isinstance(text, int) else text(value)
-
-    def _keep(self, entry: Value) -> None:
-        """Take in a number; one that is shown twice stands once."""
-        known = self._values.setdefault(entry.name, entry)
-        if known != entry:
-            raise ValueError(f'expected one value of {entry.name}, found {known} and {entry}')
 
     def listed(
         self, names: Sequence[str], values: Iterable[float], unit: str, text: Text | int = 3

@@ -1,7 +1,7 @@
 """What Herman 2018 prints, as data: gains, numbers and which figure shows what."""
 
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -41,11 +41,10 @@ FIGURES: dict[str, dict[tuple[str, str], str]] = {
 
 def has_gains(run: RunInfo, gains: Mapping[str, float]) -> bool:
     """Whether a run's gains are these multiples of the identity."""
-
-    def equal(value: Any, expected: float) -> bool:
-        return bool(np.allclose(matrix6(value), expected * np.eye(6), rtol=1e-12, atol=0.0))
-
-    return set(run.gains) == set(gains) and all(equal(run.gains[k], gains[k]) for k in gains)
+    return set(run.gains) == set(gains) and all(
+        np.allclose(matrix6(run.gains[k]), gains[k] * np.eye(6), rtol=1e-12, atol=0.0)
+        for k in gains
+    )
 
 
 def is_plain(run: RunInfo) -> bool:

@@ -126,6 +126,7 @@ class Kernel(NamedTuple):
 IN_REGISTERS, ALONE, IN_PYTHON = 'in vector registers', 'compiled', 'as plain Python'
 
 
+@cache
 def kernels(law: Any, hold: str) -> Sequence[Kernel]:
     """Kernels for a law, the fastest first; the last one always works.
 
@@ -139,20 +140,13 @@ def kernels(law: Any, hold: str) -> Sequence[Kernel]:
     hold : 'continuous' or 'zoh'
 
     """
-    if law not in SHIPPED.values():
-        return _of_user(law, hold)
-    if not JITTED:
-        return [Kernel(plain(RUNS[hold]), None, IN_PYTHON)]
-    return [Kernel(RUNS[hold], LANES, IN_REGISTERS if LANES else ALONE)]
-
-
-@cache
-def _of_user(law: Any, hold: str) -> Sequence[Kernel]:
-    """Kernels of their own for each law: numba takes two classes of one name for the same."""
     source = plain(RUNS[hold])
     in_python = Kernel(source, None, IN_PYTHON)
     if not JITTED:
         return [in_python]
+    if law in SHIPPED.values():
+        return [Kernel(RUNS[hold], LANES, IN_REGISTERS if LANES else ALONE)]
+    # of each law its own: numba takes two classes of one name for the same
     in_registers = [Kernel(uncached(source), LANES, IN_REGISTERS)] if LANES else []
     return [*in_registers, Kernel(uncached(source), None, ALONE), in_python]
 
@@ -167,7 +161,7 @@ class _Job(NamedTuple):
 
 def kernel_of(batch: Batch) -> Kernel:
     """Fastest kernel that takes the batch's law; compiles a user's law to find out, once."""
-    law = type(batch.loop.gains)
+    law: Any = type(batch.loop.gains)
     with _CHOOSING:  # the others wait: numba compiles one at a time anyway
         if (law, batch.hold) not in _CHOSEN:
             _CHOSEN[law, batch.hold] = _chosen(batch, kernels(law, batch.hold))

@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple
 
 from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.attachments import folder_name
@@ -197,18 +197,6 @@ def _simulated(scenario: Scenario) -> list[RunSource]:
 DEEPEST = 4  # folders of a path in a name
 
 
-class Named(Protocol):
-    """What tells runs apart."""
-
-    @property
-    def scenario(self) -> str:
-        """Name of the scenario."""
-
-    @property
-    def controller(self) -> str:
-        """Name of the controller."""
-
-
 class Opened(NamedTuple):
     """A run and the texts of its scenario and its vehicle, '' where they are not known."""
 
@@ -281,7 +269,7 @@ def _with_others(bag: Path, error: InputError) -> InputError:
     return InputError(error.file, error.key, f'{error.expected}{others}', error.found)
 
 
-def named(runs: Sequence[tuple[RunSource, Named]], join: str = '/') -> list[str]:
+def named(runs: Sequence[tuple[RunSource, Any]], join: str = '/') -> list[str]:
     """Names that tell runs apart, as short as that allows.
 
     The controller alone where that is enough, else `scenario/controller`; runs of equal names are
@@ -289,7 +277,7 @@ def named(runs: Sequence[tuple[RunSource, Named]], join: str = '/') -> list[str]
 
     Parameters
     ----------
-    runs : each run and where it comes from
+    runs : where each run comes from, and the run, which has a `scenario` and a `controller`
     join : stands between the parts of a name
 
     """

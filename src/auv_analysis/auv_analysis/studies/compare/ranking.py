@@ -49,11 +49,9 @@ def rank(table: pa.Table) -> Ranking:
     values = values[:, differ]
     errors = [v is not None for v in table[ERRORS].to_pylist()]
     tracks = np.array(errors)[there]  # whether there is a set-point, and so something to settle
-    ranks = (
-        np.stack([_ranks(values[:, j], m, tracks) for j, m in enumerate(measures)], axis=1)
-        if measures
-        else np.zeros((len(values), 0))
-    )
+    ranks = np.zeros(values.shape)
+    for j, measure in enumerate(measures):
+        ranks[:, j] = _ranks(values[:, j], measure, tracks)
     mean = np.nanmean(ranks, axis=1) if measures else np.arange(len(values))
     order = np.argsort(mean, kind='stable')
     return Ranking(names[there][order].tolist(), measures, ranks[order], _ratios(values)[order])

@@ -318,8 +318,8 @@ def test_shares_of_the_bounds_by_hand() -> None:
     half = 0.3  # rad, of a turn about an axis in the plane of surge and sway
     states[0, 0, 2, 3:7] = (np.cos(half), np.sin(half) * 0.6, np.sin(half) * 0.8, 0.0)
     states[0, 0, 1, 7:10], states[0, 0, 2, 10:] = (0.1, 0.2, -0.2), (1.0, 0.5, -1.0)
-    commands = np.zeros((1, 2, 6))
-    commands[0, 1] = (-7.0, 2.0, 3.0, 1.0, 1.0, -1.0)
+    commands = np.zeros((1, 1, 2, 6))
+    commands[0, 0, 1] = (-7.0, 2.0, 3.0, 1.0, 1.0, -1.0)
     used = bounds.used(Motion(commands, states))
     np.testing.assert_allclose(used[0, 0], [0.7, 0.6, 0.75, 0.75, 0.8])
     np.testing.assert_allclose(used[1, 0], [0.7, 0.0, 0.0, 0.0, 0.0], atol=1e-7)

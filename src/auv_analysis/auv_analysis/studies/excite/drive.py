@@ -140,17 +140,13 @@ class Request:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Commands (B, n, 6), the same for all vehicles or (V, B, n, 6), and states (V, B, n + 1, 13).
+    """Commands (V, B, n, 6), V = 1 of all vehicles the same, and states (V, B, n + 1, 13).
 
     A state has position, quaternion and velocity.
     """
 
     commands: np.ndarray
     states: np.ndarray
-
-    def __post_init__(self) -> None:
-        if self.commands.ndim == 3:
-            object.__setattr__(self, 'commands', self.commands[None])
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,7 +279,7 @@ def motion_of(
         applied=np.zeros((1, len(commands), 6)),
     )  # fmt: skip
     first = np.broadcast_to(start[:, :, None], (*states.shape[:2], 1, 13))
-    return Motion(commands, np.concatenate([first, states], axis=2))
+    return Motion(commands[None], np.concatenate([first, states], axis=2))
 
 
 def _closed(request: Request, waves: Harmonics, errors: Sequence[dict[str, Any]]) -> Motion:

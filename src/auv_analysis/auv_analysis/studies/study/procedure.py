@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +92,7 @@ def _stored(of: Sensitivity) -> Iterator[Row]:
 def sensitivity_table(found: Sequence[Sensitivity], controller: str) -> Table:
     """Every KPI of a controller without a refusal by falling spread, with the gains that move it.
 
+    `found` are all controllers, as in the file.
     """
     stored = enumerate(row for of in found for row in _stored(of))
     place = {(r['controller'], r['figure'], r['dof'], r['gain']): i for i, r in stored}
@@ -276,16 +278,11 @@ def write_samples(run: Run, path: Path) -> Path:
 
     """
     model = control_model(run.vehicle)
-    writer: parquet.ParquetWriter | None = None
-    try:
-        for block in run.blocks():
-            rows = _table(block, model)
-            if writer is None:
-                writer = parquet.ParquetWriter(path, rows.schema, compression='zstd')
+    tables = (_table(block, model) for block in run.blocks())
+    first = next(tables)
+    with parquet.ParquetWriter(path, first.schema, compression='zstd') as writer:
+        for rows in chain([first], tables):
             writer.write_table(rows)
-    finally:
-        if writer is not None:
-            writer.close()
     return path
 
 

@@ -144,14 +144,11 @@ def make_space(
 
 def _scale(structure: str, M: np.ndarray, *, inertial: bool) -> tuple[np.ndarray, float, float]:
     """What a coordinate multiplies, and by how much its bounds grow."""
-    inertia = np.diagonal(M)
-    if inertial and structure == 'mass':
-        return inertia.copy(), 1.0, 1.0
-    if inertial and structure == 'inertia':
-        return M.copy(), 1.0, 1.0
+    inertia, one = np.diagonal(M), np.array(1.0)
     if inertial and structure == 'scalar':
-        return np.array(1.0), float(inertia.min()), float(inertia.max())
-    return np.array(1.0), 1.0, 1.0
+        return one, float(inertia.min()), float(inertia.max())
+    multiplied = {'mass': inertia.copy(), 'inertia': M.copy()} if inertial else {}
+    return multiplied.get(structure, one), 1.0, 1.0
 
 
 def starts_of(space: GainSpace, scenario: Scenario, reference: str) -> list[np.ndarray]:

@@ -135,18 +135,15 @@ def coupling_terms(weights: np.ndarray, products: Products) -> list[dict[str, An
     found = []
     for i, j in zip(*np.nonzero(np.abs(weights) > NEGLIGIBLE), strict=True):
         weight, part = weights[i, j], weights[i, j] * along[i, j]
-        found.append(
-            {
-                'to': DOFS[i],
-                'from': DOFS[j],
-                'coefficient': float(weight),
-                'rms': float(abs(weight) * rms[j]),
-                'max': float(abs(weight) * largest[j]),
-                'share_percent': (
-                    float(100.0 * part / squares[i]) if whole[i] and squares[i] > 0 else None
-                ),
-            }
-        )
+        share = float(100.0 * part / squares[i]) if whole[i] and squares[i] > 0 else None
+        found.append({
+            'to': DOFS[i],
+            'from': DOFS[j],
+            'coefficient': float(weight),
+            'rms': float(abs(weight) * rms[j]),
+            'max': float(abs(weight) * largest[j]),
+            'share_percent': share,
+        })  # fmt: skip
     return found
 
 

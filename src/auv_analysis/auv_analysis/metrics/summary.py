@@ -227,12 +227,8 @@ def _errors(run: Run, whole: Moments, after: Moments, known: np.ndarray) -> dict
 
 def _energy(inside: Moments, window: tuple[float, float], known: np.ndarray) -> dict[str, Any]:
     if inside.count < 2:
-        return {
-            'mean': None,
-            'mean_by_component': None,
-            'shares_percent': None,
-            'window': list(window),
-        }
+        none = dict.fromkeys(('mean', 'mean_by_component', 'shares_percent'))
+        return none | {'window': list(window)}
     components = np.where(known, inside.mean(signals.ENERGY), np.nan)
     return {
         'mean': float(components.sum()),

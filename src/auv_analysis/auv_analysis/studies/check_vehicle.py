@@ -88,15 +88,9 @@ def _couplings(Upsilon: np.ndarray, inverse: np.ndarray) -> list[dict[str, Any]]
         ('delta_xi', inverse, SIGNALS['nu'].unit_of),
         ('delta_pi', Upsilon.T, SIGNALS['tau'].unit_of),
     ):
-        for i, j in zip(*np.nonzero(np.abs(weights - np.eye(6)) > NEGLIGIBLE), strict=True):
-            found.append(
-                {
-                    'from': DOFS[j],
-                    'to': DOFS[i],
-                    key: float(weights[i, j]),
-                    'unit': f'{unit(int(i))} per {unit(int(j))}',
-                }
-            )
+        for i, j in np.argwhere(np.abs(weights - np.eye(6)) > NEGLIGIBLE).tolist():
+            entry = {'from': DOFS[j], 'to': DOFS[i], key: float(weights[i, j])}
+            found.append(entry | {'unit': f'{unit(i)} per {unit(j)}'})
     return found
 
 
@@ -161,13 +155,8 @@ def _damping(vehicle: Vehicle) -> dict[str, Any]:
     for i in np.argsort(rates.real):
         energy = np.abs(modes[:, i] * (vehicle.M @ modes[:, i]))
         rate = float(rates[i].real)
-        constants.append(
-            {
-                'mostly': DOFS[int(np.argmax(energy))],
-                'rate': rate,
-                'time_constant': 1 / rate if rate > NEGLIGIBLE else None,
-            }
-        )
+        row = {'mostly': DOFS[int(np.argmax(energy))], 'rate': rate}
+        constants.append(row | {'time_constant': 1 / rate if rate > NEGLIGIBLE else None})
     symmetric = (vehicle.D_linear + vehicle.D_linear.T) / 2
     return {
         'linear_symmetric_eigenvalues': np.linalg.eigvalsh(symmetric).tolist(),

@@ -12,7 +12,6 @@ from auv_analysis.report.document import Block, Section, Sentence, write_documen
 from auv_analysis.report.results import Column, Results, Shown, described, terminal
 from auv_analysis.studies.excite.drive import WORDS
 from auv_analysis.studies.excite.excite import Excited
-from auv_analysis.studies.identify.identified import Identified
 from auv_dynamics.files.yaml_files import yaml_text
 from auv_dynamics.vehicle import DOFS
 
@@ -33,7 +32,8 @@ METHOD = (
 
 def results_of(found: Excited) -> Results:
     """All numbers of an excitation."""
-    rows, case1 = found.predicted.coefficients(), _by_name(found.case1)
+    rows = found.predicted.coefficients()
+    case1 = {row['name']: row for row in found.case1.coefficients()} if found.case1 else {}
     table = [_row(row, case1.get(row['name'])) for row in rows]
     known = [row['name'] for row in table if row['half'] is not None]
     request = found.request
@@ -88,10 +88,6 @@ def results_of(found: Excited) -> Results:
     ]  # fmt: skip
     results.add('motion', 'What is driven, and how the vehicle of the file moves.', moved, motion)
     return results
-
-
-def _by_name(found: Identified | None) -> dict[str, dict[str, Any]]:
-    return {} if found is None else {row['name']: row for row in found.coefficients()}
 
 
 def _row(row: Mapping[str, Any], case1: Mapping[str, Any] | None) -> dict[str, Any]:

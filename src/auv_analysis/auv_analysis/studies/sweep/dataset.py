@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import combinations, pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow.compute as pc
@@ -30,15 +30,6 @@ STATUSES = ('ok', 'diverged', 'refused')
 OWN = ('index', 'controller', 'seed', 'status', 'reason')
 BROKEN = 'a finished part of a sweep'
 THREADS = 2  # that NumPy sorts in; each holds the columns of a measure
-
-
-class Pair(NamedTuple):
-    """Two controllers by their places, and rows of the same rollouts (m,) of each."""
-
-    first: int
-    second: int
-    mine: np.ndarray
-    other: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,13 +107,13 @@ class Sweep:
         return found.to_numpy().astype(np.int16)
 
     @cached_property
-    def pairs(self) -> list[Pair]:
-        """For each two controllers, the rows of the rollouts that both have."""
+    def pairs(self) -> list[tuple[int, int, np.ndarray, np.ndarray]]:
+        """Places of each two controllers, and rows of the same rollouts (m,) of each."""
         found = []
         for a, b in combinations(range(len(self.controllers)), 2):
             first, second = (np.flatnonzero(self.controller == i) for i in (a, b))
             both = np.intersect1d(self.index[first], self.index[second], return_indices=True)
-            found.append(Pair(a, b, first[both[1]], second[both[2]]))
+            found.append((a, b, first[both[1]], second[both[2]]))
         return found
 
     @cached_property

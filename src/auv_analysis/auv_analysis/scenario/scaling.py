@@ -81,13 +81,9 @@ def plain_name(kind: str, name: str, longest: int = 90) -> str:
 
 
 def _slower(harmonics: dict[str, Any]) -> dict[str, Any]:
-    slower: dict[str, Any] = {}
-    if 'offset' in harmonics:
-        slower['offset'] = SLOWER * harmonics['offset']
-    slower['terms'] = [
-        term | {'amplitude': SLOWER * term['amplitude']} for term in harmonics['terms']
-    ]
-    return slower
+    offset = {key: SLOWER * harmonics[key] for key in ('offset',) if key in harmonics}
+    terms = [term | {'amplitude': SLOWER * term['amplitude']} for term in harmonics['terms']]
+    return offset | {'terms': terms}
 
 
 def _rounded(A: np.ndarray) -> np.ndarray:

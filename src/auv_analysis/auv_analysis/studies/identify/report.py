@@ -109,15 +109,10 @@ def results_of(found: Identified, notes: Sequence[str], *, accepted: bool = Fals
         })  # fmt: skip
     pairs: Mapping[str, Shown] = {
         'pair': described('pair', 'degrees of freedom'),
-        'M_prior': Column('prior'),
-        'M': Column('identified'),
+        **_interval('M'),
         'M_low': described('low', '95 % interval'),
-        'M_high': Column('high'),
         'unit': 'unit',
-        'Upsilon_prior': Column('prior', group='Υ'),
-        'Upsilon': Column('identified', group='Υ'),
-        'Upsilon_low': Column('low', group='Υ'),
-        'Upsilon_high': Column('high', group='Υ'),
+        **_interval('Upsilon', 'Υ'),
         'verdict': described('', 'whether the interval of M excludes zero', look='badge'),
     }
     results.add('inertia', 'Couplings in M and in Υ of (4).', tables['inertia'], pairs)
@@ -128,11 +123,15 @@ def results_of(found: Identified, notes: Sequence[str], *, accepted: bool = Fals
     ):  # fmt: skip
         shown: dict[str, Shown] = {'dof': described('', 'degree of freedom')}
         for symbol in symbols:
-            for key, label in (('_prior', 'prior'), ('', 'identified'), ('_low', 'low'),
-                               ('_high', 'high')):  # fmt: skip
-                shown[f'{symbol}{key}'] = Column(label, group=symbol, scale=1.0)
+            shown |= _interval(symbol, symbol)
         results.add(name, caption, tables[name], shown)
     return results
+
+
+def _interval(symbol: str, group: str = '') -> dict[str, Shown]:
+    """Columns of what has a prior, a value and an interval."""
+    labels = {'_prior': 'prior', '': 'identified', '_low': 'low', '_high': 'high'}
+    return {f'{symbol}{key}': Column(label, group) for key, label in labels.items()}
 
 
 def _listed(

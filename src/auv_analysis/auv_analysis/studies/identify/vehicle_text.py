@@ -48,10 +48,8 @@ def vehicle_text(found: Identified, data: Mapping[str, Any], name: str, source: 
     else:
         contents['inertia_matrix'] = _six(_symmetric(new.M), whole=True)
         contents.pop('added_mass', None)
-        body = dict(contents['rigid_body'])
-        body.pop('inertia', None)
-        body.pop('inertia_reference', None)
-        contents['rigid_body'] = body
+        body, apart = contents['rigid_body'], ('inertia', 'inertia_reference')
+        contents['rigid_body'] = {key: body[key] for key in body if key not in apart}
     lines = ['# Identified by auv identify; comments say what each number is: identified with its',
              '# 95 % interval, or the prior, of which the recording says too little.']  # fmt: skip
     other = [row for row in rows if not row['name'].startswith(('M.', 'D_', 'restoring.'))]

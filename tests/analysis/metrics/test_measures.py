@@ -28,6 +28,9 @@ def test_columns_are_named_like_those_of_a_sweep(summary) -> None:
     assert {name for name in COLUMNS if name != 'diverged_at'} <= set(columns)
     assert columns['velocity_error.rms.yaw'] == summary['velocity_error']['rms'][5]
     assert columns['decomposition.Upsilon.sway.yaw'] == summary['decomposition']['Upsilon'][1][5]
+    assert columns['kinetic_energy.mean'] == summary['kinetic_energy']['mean']
+    found = quantity('kinetic_energy.mean')
+    assert described('kinetic_energy.mean') == (found.label, found.unit, found.meaning)
     assert columns['kinetic_energy.window.to'] == summary['kinetic_energy']['window'][1]
     assert columns['coupling.structural_zeros.delta_xi'] == 'pitch; yaw'
     term = summary['coupling_terms']['delta_xi'][0]

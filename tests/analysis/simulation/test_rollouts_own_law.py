@@ -40,6 +40,8 @@ BRANCHES = """if nu[0] > 0.05:
 NOT_FOR_NUMBA = "assert isinstance({'a': 1, 2: 'b'}, dict)"
 FAILS = """if t > 0.1 and gains.k_P[0] > 500.0:
             raise KeyError('lost')"""
+FAILS_AHEAD = """if t > 0.02 and nu_d[0] > 2.0:
+            raise KeyError('lost')"""
 GAINS = np.geomspace(50.0, 400.0, 9)
 
 
@@ -91,6 +93,18 @@ def test_a_law_that_fails_is_named_in_its_row(scenario):
     assert columns['status'].tolist() == ['ok', 'refused', 'ok']
     assert columns['reason'][1] == "the law PI failed: KeyError: 'lost'"
     alone = rollouts(base, 'own', {'controllers.own.k_P': [400.0]})
+    assert alone['effort.rms.surge'] == columns['effort.rms.surge'][2:]
+
+
+def test_a_law_that_fails_takes_none_of_its_batch_along(scenario, monkeypatch):
+    monkeypatch.setattr(batch, 'kernels', lambda *given: kernels(*given)[-1:])  # plain Python
+    monkeypatch.setattr(batch, '_CHOSEN', {})
+    base = changed_scenario(scenario('own_ahead', FAILS_AHEAD), {'duration': 0.05})
+    columns = rollouts(base, 'own', {'setpoint.surge.offset': [0.1, 3.0, 0.2]})
+    assert columns['status'].tolist() == ['ok', 'refused', 'ok']
+    assert columns['reason'].tolist() == ['', "the law PI failed: KeyError: 'lost'", '']
+    assert np.isnan(columns['effort.rms.surge']).tolist() == [False, True, False]
+    alone = rollouts(base, 'own', {'setpoint.surge.offset': [0.2]})
     assert alone['effort.rms.surge'] == columns['effort.rms.surge'][2:]
 
 

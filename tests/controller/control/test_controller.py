@@ -595,3 +595,18 @@ def test_a_reset_while_the_wrench_is_taken_back_changes_nothing():
         bench.controller.reset()
         taken.append(bench.watch(at / 1000).tau[0] / full)
     assert taken == pytest.approx([*np.arange(1.0, 0.05, -0.1), 0.0], abs=1e-9)
+
+
+def test_after_an_answer_that_nobody_heard_it_begins_anew():
+    def made() -> Bench:
+        return Bench(acceleration='filter', ramp=0.2, reference=a_filter())
+
+    def said(bench: Bench, k: int) -> tuple:
+        bench.setpoint(10 * k)
+        return bench.odometry(10 * k, 0.01 * k).tau
+
+    bench, fresh = made(), made()
+    assert any([said(bench, k) for k in range(30)][-1])
+    bench.controller.unheard()
+    for k in range(30, 60):
+        assert said(bench, k) == said(fresh, k)

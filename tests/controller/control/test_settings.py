@@ -39,6 +39,15 @@ def test_each_limit_is_that_of_its_name():
     assert settings(**given, lockstep=True).believed[1] is None
 
 
+def test_what_differs_is_named_as_its_parameter():
+    given = {'limits.speed': 2.0, 'ramp': 0.9}
+    other = ControllerSettings.read(
+        lambda name, kind, default, text, **accepted: given.get(name, default), 'other'
+    )
+    assert other.unlike(settings()) == given
+    assert other.unlike(other) == {}
+
+
 @pytest.mark.parametrize(
     ('given', 'most'),
     [

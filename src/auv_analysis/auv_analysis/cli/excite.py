@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from auv_dynamics.vehicle.vehicle import Vehicle
 
 TILT = 0.8  # rad
+SPEED = 0.5  # m/s
 DEPTH = 10.0  # m
 SHARE = 1 / 3  # of what the thrusters give on one axis alone, as all are driven at once
 
@@ -26,18 +27,20 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     text = 'what keeps the value of the vehicle file; may be repeated'
     command.add_argument('--fixed', action='append', default=[], metavar='NAME', help=text)
     positive = number(above=0.0)
-    text = 'length of the recording, s; default: 60'
-    command.add_argument('--duration', type=number(at_least=20.0, at_most=3600.0), default=60.0,
-                         help=text)  # fmt: skip
-    text = 's, of commands and measurements; default: 0.05'
-    command.add_argument('--step', type=number(at_least=0.005, at_most=0.2), default=0.05,
-                         help=text)  # fmt: skip
+    text = 'length of the recording, s; default: 60, or 45, 30 or 20 where the bounds '
+    text += 'cannot be kept for longer'
+    command.add_argument('--duration', type=number(at_least=20.0, at_most=3600.0), help=text)
+    text = 's, of commands and measurements; default: 0.05, or less for a vehicle that damping '
+    text += 'stops faster'
+    command.add_argument('--step', type=number(at_least=0.005, at_most=0.2), help=text)
     text = 'largest wrench, 1 or 6 numbers, N and N m; 0: an axis that is not driven; default: a '
     text += 'third of what the thrusters give, else what moves the vehicle at the speed'
     command.add_argument('--limit', type=number(at_least=0.0), nargs='+', metavar='N', help=text)
-    text = 'largest speed, m/s; default: 0.5'
-    command.add_argument('--speed', type=positive, default=0.5, metavar='M/S', help=text)
-    text = 'largest angular rate, rad/s; default: twice the number of the speed'
+    text = f'largest speed, m/s; default: {SPEED:g}, or more where vehicles near the file drift as '
+    text += 'fast'
+    command.add_argument('--speed', type=positive, metavar='M/S', help=text)
+    text = 'largest angular rate, rad/s; default: twice the number of the speed, or more where '
+    text += 'vehicles near the file swing as fast by themselves'
     command.add_argument('--rate', type=positive, metavar='RAD/S', help=text)
     room = command.add_mutually_exclusive_group()
     text = 'size of the tank, m: north, east, down; the vehicle starts in its middle'
@@ -67,13 +70,22 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """What to drive so that a model can be identified."""
     import os
+    from contextlib import suppress
+    from dataclasses import replace
 
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices: threads only wait
     from auv_analysis.output.folder import results_folder
-    from auv_analysis.output.progress import bar, waiting
+    from auv_analysis.output.progress import bar, say, waiting
     from auv_analysis.scenario.scaling import plain_name
     from auv_analysis.studies.excite.drive import Request
-    from auv_analysis.studies.excite.excite import excite
+    from auv_analysis.studies.excite.excite import (
+        LENGTHS,
+        Excited,
+        Tick,
+        excite,
+        unexcited,
+        usual_step,
+    )
     from auv_analysis.studies.excite.report import (
         SCENARIO,
         print_results,
@@ -82,23 +94,42 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         write_report,
     )
     from auv_analysis.studies.identify.unknowns import DEFAULT
+    from auv_dynamics.files.errors import FailedError
+    from auv_dynamics.files.shipped import shipped
     from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
     vehicle = load_vehicle(options.vehicle)
-    steps = round(options.duration / options.step)
-    request = Request(
-        options.vehicle, bounds_of(options, vehicle), round(steps * options.step, 9), options.step,
-        (*DEFAULT, *options.free), options.fixed, options.lag, options.velocity_noise,
-        options.attitude_noise, options.spread, options.closed_loop, options.seed,
-    )  # fmt: skip
+    bounds = bounds_of(options, vehicle)
+    step = options.step or usual_step(vehicle, bounds)
+    lengths = [options.duration] if options.duration else LENGTHS
+
+    def request_of(duration: float) -> Request:
+        request = Request(
+            options.vehicle, bounds, round(round(duration / step) * step, 9), step,
+            (*DEFAULT, *options.free), options.fixed, options.lag, options.velocity_noise,
+            options.attitude_noise, options.spread, options.closed_loop, options.seed,
+        )  # fmt: skip
+        if request.closed:
+            return request
+        return replace(request, bounds=bounds_of(options, vehicle, *unexcited(request)))
+
+    def search(tick: Tick) -> Excited:
+        for duration in lengths[:-1]:
+            with suppress(FailedError):
+                return excite(request_of(duration), tick)
+        return excite(request_of(lengths[-1]), tick)
+
     out = options.out or Path('runs') / plain_name('excite', vehicle.name)
-    with results_folder(out, overwrite=options.overwrite, inputs=[request.path]) as folder:
+    with results_folder(
+        out, overwrite=options.overwrite, inputs=[shipped('vehicles', options.vehicle)]
+    ) as folder:
         with bar() as shown:
             task = shown.add_task('phases', total=1)
-            found = excite(
-                request,
-                lambda text, share: shown.update(task, description=text, completed=share),
+            found = search(
+                lambda text, share: shown.update(task, description=text, completed=share)
             )
+        if not options.duration and found.request.duration < lengths[0] - step:
+            say(f'{found.request.duration:g} s: in longer recordings the motion leaves its bounds')
         results = results_of(found)
         (folder.folder / SCENARIO).write_text(scenario_text(found), 'utf-8')
         results.write(folder.folder)
@@ -110,15 +141,18 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     return results.to_json()
 
 
-def bounds_of(options: argparse.Namespace, vehicle: Vehicle) -> Bounds:
-    """What the motion must stay within."""
+def bounds_of(
+    options: argparse.Namespace, vehicle: Vehicle, speed: float = SPEED, rate: float = 0.0
+) -> Bounds:
+    """What the motion must stay within; m/s and rad/s that must be allowed where none is given."""
     import numpy as np
 
     from auv_analysis.studies.excite.drive import Bounds
     from auv_dynamics.files.errors import InputError
     from auv_dynamics.vehicle import DOFS
 
-    rate = options.rate or 2.0 * options.speed
+    speed = options.speed or max(SPEED, speed)
+    rate = options.rate or max(2.0 * speed, rate)
     if options.limit is not None and len(options.limit) not in (1, 6):
         raise InputError('--limit', '', '1 or 6 numbers', f'{len(options.limit)} numbers')
     if options.limit is not None:
@@ -127,11 +161,11 @@ def bounds_of(options: argparse.Namespace, vehicle: Vehicle) -> Bounds:
         driven = [dof not in vehicle.thrusters.unactuated() for dof in DOFS]
         wrench = SHARE * vehicle.thrusters.alone().min(axis=0) * driven
     else:
-        nu = np.repeat([options.speed, rate], 3)
+        nu = np.repeat([speed, rate], 3)
         tilted = np.array([0.0, 0.0, 0.0, 0.5 * TILT, 0.5 * TILT, 0.0])
         still = vehicle.g(np.zeros(6))
         turning = np.abs(vehicle.g(tilted) - still)
         wrench = np.diag(vehicle.M) * nu + np.abs(np.diag(vehicle.D(nu)) * nu)
         wrench = wrench + turning + np.abs(still)
     room = np.array(options.tank or (np.inf, np.inf, options.depth))
-    return Bounds(np.asarray(wrench, float), options.speed, rate, TILT, room)
+    return Bounds(np.asarray(wrench, float), speed, rate, TILT, room)

@@ -117,7 +117,7 @@ def test_what_the_command_line_asks_for_is_what_is_searched(tmp_path, monkeypatc
 
     def search(request: Request, _: object) -> None:
         asked.append(request)
-        raise FailedError('enough')
+        raise InputError('enough', '', 'no more', 'another')
 
     monkeypatch.setattr(searching, 'excite', search)
     line = (
@@ -331,18 +331,58 @@ def test_shares_of_the_bounds_by_hand() -> None:
 def test_what_leaves_the_bounds_is_said(closed: bool) -> None:
     request = request_of(closed=closed)
     _check(request, np.array([[1.0, 0.5, 0.5, 0.5, 1.0], [0.2, 1.0, 0.5, 1.0, 0.1]]))
-    loop, other = ('closed', '') if closed else ('open', ', or --closed-loop')
-    for used, whose, share in (
-        ([[0.5, 0.5, 1.2, 0.5, 0.9], [0.5, 1.1, 1.3, 0.5, 0.5]], 'the vehicle', '1.3'),
-        ([[0.5, 0.5, 1.0, 0.5, 1.1], [0.5, 1.1, 1.25, 0.5, 0.5]], 'a vehicle near the prior',
-         '1.25'),
+    loop, other = ('closed', '') if closed else ('open', ', --closed-loop')
+    near = 'a vehicle near the prior'
+    for used, said in (
+        ([[0.5, 0.5, 1.2, 0.5, 0.9], [0.5, 1.1, 1.3, 0.5, 0.5]],
+         'the vehicle takes 1.3 times the angular rate that is allowed: a larger --rate'),
+        ([[0.5, 0.5, 1.0, 0.5, 1.1], [0.5, 1.1, 1.25, 0.5, 0.5]],
+         f'{near} takes 1.25 times the angular rate that is allowed: a larger --rate, a smaller '
+         '--spread'),
+        ([[0.5, 0.5, 0.5, 0.5, 0.5], [0.5, 0.5, 0.5, 1.5, 1.0]],
+         f'{near} takes 1.5 times the tilt that is allowed: a smaller --spread'),
     ):  # fmt: skip
         with pytest.raises(FailedError) as left:
             _check(request, np.array(used))
-        assert str(left.value) == (
-            f'{VEHICLE}: the {loop} loop leaves its bounds: {whose} takes {share} times the '
-            f'angular rate that is allowed: wider bounds or a smaller --spread{other}'
-        )
+        assert str(left.value) == (f'{VEHICLE}: the {loop} loop leaves its bounds: {said}{other}')
+
+
+def test_a_vehicle_that_drifts_gets_a_shorter_recording_and_one_that_swings_a_higher_rate(
+    tmp_path: Path, monkeypatch
+) -> None:
+    asked: list[Request] = []
+
+    def search(request: Request, _: object) -> None:
+        asked.append(request)
+        raise FailedError('it leaves its bounds')
+
+    monkeypatch.setattr(searching, 'excite', search)
+    data = yaml.safe_load(shipped('vehicles', 'girona500').read_text())
+    data['hydrostatics']['center_of_buoyancy'][2] -= 1.0  # swings at 6 rad/s
+    data['damping']['linear'][3] = 500.0
+    (tmp_path / 'stiff.yaml').write_text(yaml.safe_dump(data))
+    line = f'excite {tmp_path / "stiff.yaml"} --out {tmp_path / "out"}'.split()
+    for options in ([], ['--duration', '20', '--step', '0.05', '--speed', '0.6', '--rate', '0.7']):
+        with pytest.raises(SystemExit) as ended:
+            main.main([*line, *options])
+        assert ended.value.code == 1
+    *tried, told = asked
+    assert [one.duration for one in tried] == [60.0, 45.0, 30.0, 20.0]
+    assert [one.step for one in asked] == [0.02] * 4 + [0.05]
+    last = tried[-1]
+    families, _, fleet = searching._drawn(last)
+    still = families[0].waves(np.full((1, 12), np.log(1e-9)))
+    used = last.bounds.used(motion_of(last, still, *fleet)).max(axis=(0, 1))
+    assert last.bounds.speed == 0.5
+    assert last.bounds.rate > 1.0
+    assert used[2] == pytest.approx(1 / 1.25, rel=0.01)
+    assert used[4] < 1.0
+    assert (told.duration, told.bounds.speed, told.bounds.rate) == (20.0, 0.6, 0.7)
+
+
+def test_what_turns_over_by_itself_needs_no_higher_rate_but_a_controller() -> None:
+    request = request_of('herman2018_neutral')
+    assert searching.unexcited(replace(request, duration=20.0)) == (0.0, 0.0)
 
 
 def test_a_multisine_as_a_scenario_has_it() -> None:

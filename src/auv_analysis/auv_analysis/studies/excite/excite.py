@@ -18,6 +18,7 @@ from auv_analysis.studies.excite.drive import (
     LEAST,
     LOOP,
     WORDS,
+    Bounds,
     Family,
     Motion,
     Request,
@@ -34,8 +35,9 @@ from auv_analysis.studies.identify.record import Segment
 from auv_analysis.studies.identify.unknowns import Unknowns, unknowns
 from auv_analysis.studies.optimise import Search, sobol_points
 from auv_dynamics.files.errors import FailedError, InputError
+from auv_dynamics.plant.disturbance import Harmonics
 from auv_dynamics.vehicle.model import Model
-from auv_dynamics.vehicle.vehicle import make_model
+from auv_dynamics.vehicle.vehicle import Vehicle, make_model
 
 PHASES, STARTS = 8, 8  # of random phases, and points of the search with the best of them
 ROUNDS = {False: ((1, 8),), True: ((1, 4),)}  # by whether the loop is closed
@@ -43,6 +45,10 @@ DRAWS, CHECKED = {False: 15, True: 2}, {False: 63, True: 8}  # vehicles beside t
 RESERVE = 0.95  # of the bounds: what the search may use, as the check draws other vehicles
 TOLERANCE, APART = 1e-3, 0.1
 HALVINGS = 7  # of the interval in which an amplitude is looked for that stays within the bounds
+LENGTHS = (60.0, 45.0, 30.0, 20.0)  # s: the first that keeps its bounds, where none is told
+STEPS, STABLE = (0.05, 0.02, 0.01, 0.005), 2.0  # s, and of the fastest rate, for Runge-Kutta
+FASTER = 1.25  # times the speeds without excitation: what must be allowed
+WIDER = ('--limit', '--speed', '--rate', '', '--depth or --tank')  # in the order of `WORDS`
 LIGHT, CORRELATED = 0.02, 0.5  # of the weight, of off-diagonal inertia: what a spread of 1 is
 Tick = Callable[[str, float], None]
 Fleet = tuple[Model, list[dict[str, Any]]]  # of the open loop, and errors of the closed one's plant
@@ -87,8 +93,7 @@ def excite(request: Request, tick: Tick = lambda text, share: None) -> Excited:
     FailedError : the motion leaves its bounds, whatever is driven
 
     """
-    rng = np.random.default_rng(request.seed)
-    families = [Family.of(request, rng) for _ in range(PHASES)]
+    families, fleet, every = _drawn(request)
     if not len(families[0].driven):
         found = ', '.join(f'{value:g}' for value in request.hold)
         expected = 'more than what holds the vehicle still, in some degree of freedom'
@@ -96,7 +101,6 @@ def excite(request: Request, tick: Tick = lambda text, share: None) -> Excited:
     u = _reference(request)
     if not u.entries:
         raise InputError('--free', '', 'a coefficient that is free', 'none')
-    fleet = _fleet(request, rng, DRAWS[request.closed])
 
     def evaluated(family: Family, x: np.ndarray) -> np.ndarray:
         motion = motion_of(request, family.waves(x), *fleet)
@@ -107,7 +111,7 @@ def excite(request: Request, tick: Tick = lambda text, share: None) -> Excited:
     middle = np.zeros((1, len(low)))
     least = middle.copy()
     least[:, : len(families[0].driven)] = np.log(LEAST)
-    motion = motion_of(request, families[0].waves(least), *fleet)
+    motion = motion_of(request, families[0].waves(least), *every)
     _check(request, request.bounds.used(motion)[:, 0])  # what leaves them undriven always does
     gained = []
     for k, family in enumerate(families):
@@ -126,14 +130,34 @@ def excite(request: Request, tick: Tick = lambda text, share: None) -> Excited:
     starts = np.vstack([middle, sobol_points(low, high, STARTS, request.seed)[1:]])
     best = search.run(within(request, family, starts, fleet, RESERVE), rounds)[None]
     tick('checking', 0.0)
-    fleet = _fleet(request, rng, CHECKED[request.closed])
-    wave = family.waves(within(request, family, best, fleet, 1.0))
-    motion = motion_of(request, wave, *fleet)
+    wave = family.waves(within(request, family, best, every, 1.0))
+    motion = motion_of(request, wave, *every)
     used = request.bounds.used(motion)[:, 0]
     _check(request, used)
     predicted = prediction(request, motion.commands[0, 0], motion.states[0, 0])
     data = scenario_of(request, wave.part(0))
     return Excited(request, data, motion, used, predicted, of_case1(request), PHASES + count)
+
+
+def usual_step(vehicle: Vehicle, bounds: Bounds) -> float:
+    """Step in s of commands and measurements, in which damping at the largest speed is stable."""
+    damped = np.linalg.solve(vehicle.M, vehicle.D(np.repeat([bounds.speed, bounds.rate], 3)))
+    rate = np.abs(np.linalg.eigvals(damped)).max()
+    return next((step for step in STEPS if step * rate < STABLE), STEPS[-1])
+
+
+def unexcited(request: Request) -> tuple[float, float]:
+    """Speed and rate, m/s and rad/s, that vehicles around the prior need without excitation.
+
+    With some to spare; zero where an open loop of them leaves tilt or room.
+    """
+    families, _, fleet = _drawn(request)
+    rest = Harmonics(families[0].offset[None], (np.zeros((1, 0, 3)),) * 6)
+    bounds = request.bounds
+    used = bounds.used(motion_of(request, rest, *fleet)).max(axis=(0, 1))
+    if used[3:].max() > 1.0:
+        return 0.0, 0.0
+    return float(FASTER * used[1] * bounds.speed), float(FASTER * used[2] * bounds.rate)
 
 
 def within(
@@ -171,6 +195,14 @@ def _unknowns(request: Request, speeds: np.ndarray, wrenches: np.ndarray) -> Unk
         request.vehicle, request.free, request.fixed, speeds=np.maximum(speeds, 1e-3),
         wrenches=wrenches, lag=request.lag,
     )  # fmt: skip
+
+
+def _drawn(request: Request) -> tuple[list[Family], Fleet, Fleet]:
+    """Families of random phases, vehicles of the search, and those of the check."""
+    rng = np.random.default_rng(request.seed)
+    families = [Family.of(request, rng) for _ in range(PHASES)]
+    few, many = (_fleet(request, rng, count[request.closed]) for count in (DRAWS, CHECKED))
+    return families, few, many
 
 
 def _fleet(request: Request, rng: np.random.Generator, count: int) -> Fleet:
@@ -289,10 +321,12 @@ def _check(request: Request, used: np.ndarray) -> None:
     if np.all(worst <= 1.0):
         return
     k = int(np.argmax(worst))
-    whose = 'the vehicle' if used[0, k] > 1.0 else 'a vehicle near the prior'
-    loop = 'closed' if request.closed else 'open'
-    way = 'wider bounds or a smaller --spread' + ('' if request.closed else ', or --closed-loop')
+    near = bool(used[0, k] <= 1.0)
+    whose, loop = 'a vehicle near the prior' if near else 'the vehicle', 'closed'
+    ways = [f'a larger {WIDER[k]}'] * bool(WIDER[k]) + ['a smaller --spread'] * near
+    if not request.closed:
+        loop, ways = 'open', [*ways, '--closed-loop']
     raise FailedError(
         f'{request.vehicle.name}: the {loop} loop leaves its bounds: {whose} takes '
-        f'{worst[k]:.3g} times the {WORDS[k]} that is allowed: {way}'
+        f'{worst[k]:.3g} times the {WORDS[k]} that is allowed: {", ".join(ways)}'
     )

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yaml
 from helpers.sea_trials import DELAY, LAG, trial, wrong_prior
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -46,6 +47,7 @@ from auv_analysis.studies.identify.residuals import FARTHEST, fill_residuals
 from auv_analysis.studies.identify.start import least_squares_start
 from auv_analysis.studies.identify.unknowns import unknowns
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.shipped import shipped
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
 AHEAD = [1.0, 0.0, 0.0, 0.0]
@@ -390,6 +392,32 @@ def test_a_start_is_found_from_a_slow_velocity(herman, rate):
     quadratic, true = (np.diag(a.D_quadratic)[:3] for a in (found, vehicle))
     assert_allclose(quadratic, true, rtol=0.2)
     assert late == pytest.approx(LAG + DELAY, abs=0.03)
+
+
+def test_a_start_counts_lift_and_couplings_of_damping(tmp_path):
+    """Without them inertia of pitch and yaw comes out a third too large."""
+    data = yaml.safe_load(shipped('vehicles', 'herman2018').read_text())
+    lift, linear = np.zeros((6, 6)), np.diag(np.diag(load_vehicle('herman2018').D_linear))
+    lift[[1, 1, 2, 2, 4, 4, 5, 5], [1, 5, 2, 4, 2, 4, 1, 5]] = (
+        400,
+        -300,
+        400,
+        300,
+        -900,
+        900,
+        900,
+        900,
+    )
+    linear[1, 5], linear[5, 1] = -90.0, 90.0
+    data |= {'lift': lift.tolist(), 'damping': data['damping'] | {'linear': linear.tolist()}}
+    (tmp_path / 'finned.yaml').write_text(yaml.safe_dump(data))
+    vehicle = load_vehicle(tmp_path / 'finned.yaml')
+    one, _ = trial(tmp_path, 'herman2018', 3, vehicle='finned.yaml', duration=40.0)
+    speeds, wrenches = (np.sqrt((x**2).mean(axis=0)) for x in (one.velocity, one.command))
+    u = unknowns(vehicle, speeds=speeds, wrenches=wrenches)
+    theta, _, wrong = least_squares_start([one], u, vehicle.lift)
+    assert not wrong
+    assert_allclose(np.diag(u.coefficients(theta).M), np.diag(vehicle.M), rtol=0.05)
 
 
 def test_pauses_of_several_topics_end_a_stretch_as_those_of_one_do_and_a_told_gap_as_told():

@@ -134,7 +134,7 @@ def identify(
     if not u.entries:
         raise InputError('--free', '', 'a coefficient that is free, beside the delay', 'none')
     say('least squares')
-    theta, late, wrong = least_squares_start(training, u)
+    theta, late, wrong = least_squares_start(training, u, vehicle.lift)
     if wrong:
         expected = 'a wrench that accelerates the vehicle its own way (axes FLU in place of FSD?)'
         raise InputError(training[0].name, 'wrench', expected, f'the opposite in {join(wrong)}')

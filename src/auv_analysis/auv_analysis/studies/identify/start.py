@@ -27,19 +27,19 @@ FLOOR = 0.02  # of the largest eigenvalue of the scaled M: below it, a direction
 
 
 def least_squares_start(
-    records: Sequence[Record], unknowns: Unknowns
+    records: Sequence[Record], unknowns: Unknowns, lift: np.ndarray | None = None
 ) -> tuple[np.ndarray, float, list[str]]:
     """Theta (n,), the sum of lag and delay in s, degrees of freedom whose command is reversed.
 
     Where a velocity is never measured, or the recording is too short for windows, the prior is the
-    start. Coefficients that are not free keep the prior.
+    start. What is not free keeps the prior, as do lift (6, 6) and couplings of damping.
     """
     every = [_regressors(record) for record in records if record.known.all()]
     rows = [row for row in every if row is not None]
     theta, prior = np.zeros(len(unknowns.entries)), unknowns.prior
     if not rows:
         return theta, float(prior.lag + prior.delay), []
-    normal = _Normal(rows, unknowns)
+    normal = _Normal(rows, unknowns, lift)
     fits = [normal.solve(delay) for delay in DELAYS]
     best = int(np.argmin([cost for cost, _ in fits]))
     late, found = float(DELAYS[best]), fits[best][1]
@@ -63,8 +63,11 @@ def _reversed(found: dict[str, np.ndarray], unknowns: Unknowns) -> list[str]:
     return [DOFS[i] for i in np.flatnonzero(wrong)]
 
 
-def _regressors(record: Record) -> tuple[Record, np.ndarray, np.ndarray] | None:
-    """Times (k,) and Y (k, 6, 21 + 6 + 6 + 4): tau = Y [M, D_linear, D_quadratic, hydrostatics]."""
+def _regressors(record: Record) -> tuple[Record, np.ndarray, np.ndarray, np.ndarray] | None:
+    """Times (k,), Y (k, 6, 21 + 6 + 6 + 4) and velocity (k, 6).
+
+    tau = Y [M, D_linear, D_quadratic, hydrostatics], of damping the diagonals.
+    """
     there = np.isfinite(record.velocity).all(axis=1)
     t, nu = record.velocity_t[there], record.velocity[there]
     period = usual_interval(t)
@@ -75,7 +78,8 @@ def _regressors(record: Record) -> tuple[Record, np.ndarray, np.ndarray] | None:
     count = max(round(WINDOW / period), SMALLEST)
     smooth, rate = smoothed(t, nu, at), rates(t, nu, at, count).rate
     q = smoothed(record.attitude_t, continuous(record.attitude), at)
-    return record, at, _linear(smooth, rate, down_of(q / np.linalg.norm(q, axis=1)[:, None]))
+    Y = _linear(smooth, rate, down_of(q / np.linalg.norm(q, axis=1)[:, None]))
+    return record, at, Y, smooth
 
 
 def _linear(nu: np.ndarray, rate: np.ndarray, d: np.ndarray) -> np.ndarray:
@@ -97,7 +101,12 @@ def _linear(nu: np.ndarray, rate: np.ndarray, d: np.ndarray) -> np.ndarray:
 class _Normal:
     """Sums over all samples, by degree of freedom, for any weights and any delay."""
 
-    def __init__(self, rows: Sequence[tuple[Record, np.ndarray, np.ndarray]], unknowns: Unknowns):
+    def __init__(
+        self,
+        rows: Sequence[tuple[Record, np.ndarray, np.ndarray, np.ndarray]],
+        unknowns: Unknowns,
+        lift: np.ndarray | None,
+    ):
         prior, free = unknowns.prior, _free(unknowns)
         self.known = np.concatenate(
             [prior.M[tuple(zip(*LOWER, strict=True))], np.diag(prior.D_linear),
@@ -107,6 +116,11 @@ class _Normal:
         self.prior, self.free = prior, free
         self.rows = [row[:2] for row in rows]
         self.fixed = Y[:, :, ~free] @ self.known[~free]
+        nu = np.concatenate([row[3] for row in rows])
+        for A, x in ((prior.D_linear, nu), (prior.D_quadratic, nu * np.abs(nu))):
+            self.fixed += x @ (A - np.diag(np.diag(A))).T
+        if lift is not None:
+            self.fixed += np.abs(nu[:, :1]) * nu @ lift.T
         self.Y = np.ascontiguousarray(Y[:, :, free].swapaxes(0, 1))  # (6, k, n)
         self.gram = self.Y.swapaxes(1, 2) @ self.Y
         scale = np.maximum(np.abs(self.known[free]), 1e-3 * np.abs(self.known).max())

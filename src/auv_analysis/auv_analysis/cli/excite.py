@@ -130,6 +130,9 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
             )
         if not options.duration and found.request.duration < lengths[0] - step:
             say(f'{found.request.duration:g} s: in longer recordings the motion leaves its bounds')
+        if found.request.clipped:
+            say('the law also asks for axes that nothing drives: record wrench_applied, identify '
+                'with --applied')  # fmt: skip
         results = results_of(found)
         (folder.folder / SCENARIO).write_text(scenario_text(found), 'utf-8')
         results.write(folder.folder)

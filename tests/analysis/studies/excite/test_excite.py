@@ -359,7 +359,6 @@ def test_a_vehicle_that_drifts_gets_a_shorter_recording_and_one_that_swings_a_hi
     monkeypatch.setattr(searching, 'excite', search)
     data = yaml.safe_load(shipped('vehicles', 'girona500').read_text())
     data['hydrostatics']['center_of_buoyancy'][2] -= 1.0  # swings at 6 rad/s
-    data['damping']['linear'][3] = 500.0
     (tmp_path / 'stiff.yaml').write_text(yaml.safe_dump(data))
     line = f'excite {tmp_path / "stiff.yaml"} --out {tmp_path / "out"}'.split()
     for options in ([], ['--duration', '20', '--step', '0.05', '--speed', '0.6', '--rate', '0.7']):
@@ -637,3 +636,8 @@ def test_axes_that_may_not_be_driven_are_not(closed: bool) -> None:
         commands = motion_of(request, waves, request.vehicle.model, [{}]).commands
         assert not commands[..., 2:5].any(), 'the law would hold depth and level'
         assert commands[..., [0, 1, 5]].any()
+    assert request.clipped == closed
+    names = searching._unknowns(request, np.ones(6), wrench).names
+    assert ('lag' in names) != closed, 'what acts has none'
+    found = SimpleNamespace(request=request, scenario={})
+    assert ('then auv identify --applied.' in scenario_text(found)) == closed

@@ -118,6 +118,11 @@ class Request:
         return vehicle_from_dict(self.vehicle_data, self.path)
 
     @property
+    def clipped(self) -> bool:
+        """Whether a law asks for axes that are not driven: what acts is to be recorded."""
+        return self.closed and not self.bounds.wrench.all()
+
+    @property
     def noise(self) -> np.ndarray:
         """(9,) as of `OutputError`."""
         return np.repeat([self.velocity_noise, self.attitude_noise], (6, 3))

@@ -46,7 +46,7 @@ RESERVE = 0.95  # of the bounds: what the search may use, as the check draws oth
 TOLERANCE, APART = 1e-3, 0.1
 HALVINGS = 7  # of the interval in which an amplitude is looked for that stays within the bounds
 LENGTHS = (60.0, 45.0, 30.0, 20.0)  # s: the first that keeps its bounds, where none is told
-STEPS, STABLE = (0.05, 0.02, 0.01, 0.005), 2.0  # s, and of the fastest rate, for Runge-Kutta
+STEPS, SMOOTH = (0.05, 0.02, 0.01, 0.005), 1.0  # s, and of time constants of damping
 FASTER = 1.25  # times the speeds without excitation: what must be allowed
 WIDER = ('--limit', '--speed', '--rate', '', '--depth or --tank')  # in the order of `WORDS`
 LIGHT, CORRELATED = 0.02, 0.5  # of the weight, of off-diagonal inertia: what a spread of 1 is
@@ -140,10 +140,10 @@ def excite(request: Request, tick: Tick = lambda text, share: None) -> Excited:
 
 
 def usual_step(vehicle: Vehicle, bounds: Bounds) -> float:
-    """Step in s of commands and measurements, in which damping at the largest speed is stable."""
+    """Step of commands and measurements in s, in which damping at the largest speed does little."""
     damped = np.linalg.solve(vehicle.M, vehicle.D(np.repeat([bounds.speed, bounds.rate], 3)))
     rate = np.abs(np.linalg.eigvals(damped)).max()
-    return next((step for step in STEPS if step * rate < STABLE), STEPS[-1])
+    return next((step for step in STEPS if step * rate < SMOOTH), STEPS[-1])
 
 
 def unexcited(request: Request) -> tuple[float, float]:
@@ -191,8 +191,9 @@ def _reference(request: Request) -> Unknowns:
 
 
 def _unknowns(request: Request, speeds: np.ndarray, wrenches: np.ndarray) -> Unknowns:
+    fixed = [*request.fixed, *(['lag', 'delay'] if request.clipped else [])]
     return unknowns(
-        request.vehicle, request.free, request.fixed, speeds=np.maximum(speeds, 1e-3),
+        request.vehicle, request.free, fixed, speeds=np.maximum(speeds, 1e-3),
         wrenches=wrenches, lag=request.lag,
     )  # fmt: skip
 

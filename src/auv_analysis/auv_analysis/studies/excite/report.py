@@ -130,8 +130,9 @@ def scenario_text(found: Excited) -> str:
     """Text of the scenario's file."""
     request, data = found.request, found.scenario
     what = 'Set-points' if request.closed else 'An open-loop wrench'
+    applied = ' --applied' * request.clipped
     head = (
-        f'# {what} to identify {request.vehicle.name} with: auv run, then auv identify.\n'
+        f'# {what} to identify {request.vehicle.name} with: auv run, then auv identify{applied}.\n'
         f'# Written by auv excite, seed {request.seed}. Sensors and lag are those that the\n'
         '# prediction assumes; beside a vehicle they are its own.\n'
     )

@@ -16,9 +16,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis import load_scenario, summarize
-from auv_analysis.bag.load import _slopes, load_run, obeyed, open_bag
+from auv_analysis.bag.load import _slopes, _without, load_run, obeyed, open_bag
 from auv_analysis.bag.metadata import RECORDING, recording_text
-from auv_analysis.bag.reading import read_bag, stretches
+from auv_analysis.bag.reading import BagContents, read_bag, stretches
+from auv_analysis.bag.step_topics import NotOursError
 from auv_analysis.cli.main import main
 from auv_analysis.nodes.recorder_node import StepLedger
 from auv_analysis.runs.run import Run
@@ -134,6 +135,11 @@ def test_damage_before_the_first_odometry_is_said(tmp_path: Path) -> None:
     bag.write_bytes(data[:at] + b'\xff' + data[at + 1 :])
     with pytest.raises(InputError, match=r'odom: .*found bag.mcap: damaged from .*recover'):
         load_run(bag)
+    kinds = dict.fromkeys(['/odom', '/a/wrench'], '')
+    lost = BagContents(types=kinds, notes=['bag.mcap: damaged from byte 9, read up to there'])
+    assert '/a/wrench: expected messages, found bag.mcap: dam' in str(_without('wrench', lost, bag))
+    for role, contents in (('cmd_vel', lost), ('wrench', BagContents(types=kinds))):
+        assert isinstance(_without(role, contents, bag), NotOursError)
 
 
 def test_one_step_is_no_run(tmp_path: Path) -> None:
@@ -245,7 +251,7 @@ def test_a_clock_that_was_set_back_by_less_than_a_second_has_begun_anew(tmp_path
     ([*range(60), *range(30, 100)], [0, 60, 130]),
     ([*range(20), *range(40, 60), *range(20, 40), *range(60, 100)], [0, 100]),  # they came late
     ([*range(0, 60, 20), *range(30, 60)], [0, 33]), ([*range(40), 10, *range(40, 60)], [0, 61]),
-    ([5, 5, 5], [0, 3]), ([], [0, 0]),
+    ([5, 5, 5], [0, 3]), ([3, 2, 1], [0, 3]), ([], [0, 0]),
 ])  # fmt: skip
 def test_where_a_clock_begins_anew(order: list[int], edges: list[int]) -> None:
     assert stretches(np.array(order, np.int64) * 10 * MS) == edges

@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from auv_analysis import load_scenario, summarize
 from auv_analysis.bag.load import load_run, open_bag
 from auv_analysis.bag.metadata import RECORDING, recording_text
+from auv_analysis.bag.plant_run import longest_part, time_zero
 from auv_analysis.runs.run import Run
 
 MS, STEP = 1_000_000, 10_000_000
@@ -55,6 +56,7 @@ def test_the_time_of_a_bag_without_its_beginning_is_that_of_the_run(tmp_path: Pa
     assert said(run, 'begins at 0.3 s')
     assert not said(whole, 'begins')
     assert not said(whole, 'ends')
+    assert whole.unrecorded == {'measured', 'applied'}, 'faults of both, and neither topic'
     reason = 'the law had begun before the first sample: z is not known'
     assert reason in summarize(run)['lyapunov']['reason']
     assert reason not in summarize(whole)['lyapunov']['reason']
@@ -108,3 +110,22 @@ def test_of_a_bag_that_was_thinned_the_integrals_are_not_known(tmp_path: Path) -
     one = load_run(write(tmp_path / 'one', [*range(50), *range(51, 101)]))
     assert not said(one, 'apart')
     assert 'samples of the law are missing' in summarize(one)['lyapunov']['reason']
+
+
+@pytest.mark.parametrize('plant', [
+    {}, {'duration': 1.0}, {'step': 0.01}, {'step': '0.01', 'duration': 1.0},
+    {'step': 0.01, 'duration': 'long'}, {'step': 0.01, 'duration': 0.1}, {'lockstep': True},
+])  # fmt: skip
+def test_of_a_run_whose_plan_is_not_known_or_of_another_one_nothing_is_missing(plant) -> None:
+    assert time_zero(np.array([3, 4, 5]) * 100 * MS, plant) == (300 * MS, [])
+
+
+def test_resets_are_looked_for_where_a_plant_was_and_some_are_named() -> None:
+    ns, x = np.arange(12) * STEP, np.zeros((12, 13))
+    x[:, 3], x[:, 0] = 1.0, [0, 1, 0, 2, 0, 1, 0, 2, 3, 0, 1, 0]
+    kept, (note,) = longest_part(ns, {'odom': x}, {'step': 0.01}, STEP)
+    assert kept == slice(6, 9)
+    assert '0.01, 0.03, 0.05 s and 2 times more; read the longest of 6 parts' in note
+    for plant in ({}, {'initial.eta': 'far'}, {'initial.nu': [0.0]}):
+        assert longest_part(ns, {'odom': x}, plant, 0) == (slice(None), [])
+    assert longest_part(ns, {'odom': x, 'ground_truth/odom': x[:1]}, {'step': 0.01}, 0)[1] == []

@@ -1,12 +1,16 @@
 """The command line's grammar: what numbers, names and topics are taken, defaults, refusals."""
 
 import argparse
+import importlib
+import io
 import math
 import re
+import sys
 from argparse import Namespace
 
 import pytest
 
+from auv_analysis import cli
 from auv_analysis.cli.arguments import namespace, number, refuse_given, topic, whole
 from auv_analysis.cli.main import main, parser
 from auv_dynamics.files.errors import InputError
@@ -119,3 +123,17 @@ def test_options_on_their_border_and_abbreviated_are_taken() -> None:
     assert (found.seconds, found.expect_rate, found.speed) == (600.0, 1e4, 0.5)
     assert found.axis == ['surge']
     assert parser().parse_args(['linearize', 'case1', '--delay', '0']).delay == 0.0
+
+
+@pytest.mark.parametrize(('program', 'raised', 'last'), [
+    ('bin/auv', KeyboardInterrupt(), 'interrupted'), ('bin/auv', ValueError('x'), 'ValueError: x'),
+    ('pytest', KeyboardInterrupt(), 'KeyboardInterrupt'),
+])  # fmt: skip
+def test_a_ctrl_c_before_the_command_has_begun_is_one_line(program, raised, last, monkeypatch):
+    monkeypatch.setattr(sys, 'argv', [program])
+    monkeypatch.setattr(sys, 'excepthook', sys.__excepthook__)
+    said = io.StringIO()
+    monkeypatch.setattr(sys, 'stderr', said)
+    importlib.reload(cli)
+    sys.excepthook(type(raised), raised, None)
+    assert said.getvalue() == f'{last}\n'

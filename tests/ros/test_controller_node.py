@@ -29,7 +29,7 @@ from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from auv_dynamics.files.errors import ENDING
+from auv_dynamics.files.errors import ENDING, InputError
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
 from auv_dynamics.ros.node_interface import ERROR, OK, WARN
@@ -375,6 +375,13 @@ def test_a_transition_that_does_not_exist_is_refused() -> None:
 )
 def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
     assert_one_line(run_node('controller_node', *arguments), key, expected)
+
+
+@pytest.mark.parametrize('key', ['odometry_timeout', 'limits.gap', 'limits.acceleration'])
+def test_numbers_that_overflow_are_refused_by_their_names(key: str) -> None:
+    with program() as made, pytest.raises(InputError) as caught:
+        made.add(ControllerNode, {**GIVEN, key: 1e308})
+    assert (caught.value.key, caught.value.found) == (key, '1e+308')
 
 
 @pytest.mark.parametrize(

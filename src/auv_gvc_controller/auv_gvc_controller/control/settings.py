@@ -10,7 +10,8 @@ import numpy as np
 
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import is_number
-from auv_dynamics.ros.settings import Reader, name_of, read_settings, setting
+from auv_dynamics.ros.interface import LARGEST
+from auv_dynamics.ros.settings import LONGEST, Reader, name_of, read_settings, setting
 from auv_dynamics.vehicle.thrusters import SATURATIONS, SCALED, AttainableWrench, make_reach
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_gvc_controller.control.controller import OutputStage, Timeouts, VelocityController
@@ -28,6 +29,7 @@ from auv_gvc_controller.laws.model import control_model
 
 LATEST, EXACT = 'latest', 'exact'
 _number = partial(setting, at_least=0.0)
+_seconds = partial(_number, at_most=LONGEST)
 
 
 def _six(text: str, name: str) -> Any:
@@ -68,13 +70,13 @@ class ControllerSettings:
     filter_angular_acceleration: float = _number(
         0.2, 'rad/s2, the same of roll, pitch and yaw', 'setpoint_filter.angular_acceleration'
     )
-    odometry_timeout: float = _number(0.5, 's, silence or age of the stamp: zero wrench')
-    setpoint_timeout: float = _number(0.5, 's, silence or age of the stamp: zero wrench')
-    limits_gap: float = _number(1.0, 's, longest step of time that is integrated', 'limits.gap')
+    odometry_timeout: float = _seconds(0.5, 's, silence or age of the stamp: zero wrench')
+    setpoint_timeout: float = _seconds(0.5, 's, silence or age of the stamp: zero wrench')
+    limits_gap: float = _seconds(1.0, 's, longest step of time that is integrated', 'limits.gap')
     limits_speed: float = _number(20.0, 'm/s; more is refused', 'limits.speed')
     limits_rate: float = _number(20.0, 'rad/s; more is refused', 'limits.rate')
     limits_acceleration: float = _number(
-        100.0, 'm/s2, rad/s2; more is refused', 'limits.acceleration'
+        100.0, 'm/s2, rad/s2; more is refused', 'limits.acceleration', at_most=LARGEST
     )
     limits_wrench: tuple[float, ...] = _six(
         'largest wrench; must be known in real time', 'limits.wrench'

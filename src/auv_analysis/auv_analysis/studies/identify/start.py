@@ -20,6 +20,11 @@ from auv_dynamics.vehicle.model import coriolis
 DELAYS = np.arange(0.0, 0.43, 0.03)  # s
 WINDOW, WIDEST = 0.5, 2.0  # s, and at most, of few samples
 FITTED = ('M', 'D_linear', 'D_quadratic', 'hydrostatics')
+PLACES: list[tuple[str, tuple[int, ...]]] = [  # of the 37 regressors
+    *(('M', ij) for ij in LOWER),
+    *((group, (i, i)) for group in ('D_linear', 'D_quadratic') for i in range(6)),
+    *(('hydrostatics', (i,)) for i in range(4)),
+]
 MOST = 8000  # samples that are used
 REWEIGHTED = 4
 REVERSED = 0.3  # of the prior's inertia: what comes out more negative is no noise
@@ -43,7 +48,7 @@ def least_squares_start(
     fits = [normal.solve(delay) for delay in DELAYS]
     best = int(np.argmin([cost for cost, _ in fits]))
     late, found = float(DELAYS[best]), fits[best][1]
-    reversed_ = _reversed(found, unknowns)
+    reversed_ = _reversed(found, prior.M) if normal.free[: len(LOWER)].all() else []
     if not unknowns.is_delay_free:
         late = float(prior.lag + prior.delay)
         found = normal.solve(late)[1]
@@ -54,12 +59,9 @@ def least_squares_start(
     return theta, late, reversed_
 
 
-def _reversed(found: dict[str, np.ndarray], unknowns: Unknowns) -> list[str]:
+def _reversed(found: dict[str, np.ndarray], M: np.ndarray) -> list[str]:
     """Degrees of freedom in which the command pushes against the acceleration that it makes."""
-    if not all(('M', ij) in _places(unknowns) for ij in LOWER):
-        return []
-    diagonal, prior = np.diag(found['raw']), np.diag(unknowns.prior.M)
-    wrong = (diagonal < -REVERSED * prior) & (found['explained'] > 0.5)
+    wrong = (np.diag(found['raw']) < -REVERSED * np.diag(M)) & (found['explained'] > 0.5)
     return [DOFS[i] for i in np.flatnonzero(wrong)]
 
 
@@ -107,7 +109,8 @@ class _Normal:
         unknowns: Unknowns,
         lift: np.ndarray | None,
     ):
-        prior, free = unknowns.prior, _free(unknowns)
+        prior, there = unknowns.prior, {(entry.group, entry.index) for entry in unknowns.entries}
+        free = np.array([place in there for place in PLACES])
         self.known = np.concatenate(
             [prior.M[tuple(zip(*LOWER, strict=True))], np.diag(prior.D_linear),
              np.diag(prior.D_quadratic), prior.hydrostatics]
@@ -149,18 +152,6 @@ class _Normal:
             'D_quadratic': _with_diagonal(self.prior.D_quadratic, known[27:33]),
             'hydrostatics': known[33:],
         }
-
-
-def _free(unknowns: Unknowns) -> np.ndarray:
-    groups = _places(unknowns)
-    places: list[tuple[str, tuple[int, ...]]] = [('M', ij) for ij in LOWER]
-    places += [(group, (i, i)) for group in ('D_linear', 'D_quadratic') for i in range(6)]
-    places += [('hydrostatics', (i,)) for i in range(4)]
-    return np.array([place in groups for place in places])
-
-
-def _places(unknowns: Unknowns) -> set[tuple[str, tuple[int, ...]]]:
-    return {(entry.group, entry.index) for entry in unknowns.entries}
 
 
 def _command(record: Record, at: np.ndarray) -> np.ndarray:

@@ -151,6 +151,9 @@ def _manifest(campaign: Campaign) -> dict[str, Any]:
     data = dict(scenario.data)
     if table := scenario.attachments.get('setpoint.csv'):
         data['setpoint'] = {'file': 'setpoint.csv'}
+    kinds = {kind_of(spec) for spec in campaign.data['vary']} - {'grid', 'zip'}
+    packages = (['scipy'] if kinds else []) + (['SALib'] if 'morris' in kinds else [])
+    drawn_by = {package: metadata.version(package) for package in packages}
     return json.loads(json.dumps({
         'format': 1,
         'campaign': campaign.data,
@@ -159,16 +162,9 @@ def _manifest(campaign: Campaign) -> dict[str, Any]:
                      for entry in campaign.scenarios.values()},
         'setpoint.csv': table,
         'laws': laws_of(campaign),
-        'versions': {**versions(), **_sampling_versions(campaign), 'machine': platform.machine()},
+        'versions': {**versions(), **drawn_by, 'machine': platform.machine()},
         'rollouts': campaign.rollouts,
     }))  # fmt: skip
-
-
-def _sampling_versions(campaign: Campaign) -> dict[str, str]:
-    """Versions of the libraries that drew the samples."""
-    kinds = {kind_of(spec) for spec in campaign.data['vary']} - {'grid', 'zip'}
-    packages = (['scipy'] if kinds else []) + (['SALib'] if 'morris' in kinds else [])
-    return {package: metadata.version(package) for package in packages}
 
 
 def _write_inputs(out: Path, campaign: Campaign) -> list[str]:

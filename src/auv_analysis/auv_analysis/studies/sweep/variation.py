@@ -196,12 +196,10 @@ class SamplingPlan(NamedTuple):
 def make_design(
     kind: str, paths: list[str], spec: dict[str, Any], seed: int, group: int
 ) -> SamplingPlan:
-    """Design of a checked group of a campaign.
+    """Design of a checked group of a campaign, of the k coordinates that are named.
 
     Parameters
     ----------
-    kind : a key of DESIGNS
-    paths : names of the k coordinates
     spec : the group's `count` and what else its kind takes
     seed, group : root seed of the campaign and the group's number
 

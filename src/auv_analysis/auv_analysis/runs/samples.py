@@ -25,9 +25,7 @@ DAMAGED = (ValueError, TypeError, AttributeError, EOFError, MemoryError)
 
 def write_samples(run: Run, path: Path) -> None:
     """Write the samples of a run, with whether its law was sampled and held."""
-    motion = 't', 'eta', 'nu', 'nu_measured', 'nu_d', 'nu_d_dot'
-    forces = 'tau', 'tau_applied', 'disturbance', 'disturbance_estimate', 'law_state'
-    found = {name: getattr(run, name) for name in (*motion, *forces)}
+    found = {name: getattr(run, name) for name in (*MOTION, *FORCES, *OPTIONAL)}
     known = {name: values for name, values in found.items() if values is not None}
     np.savez_compressed(path, **known, hold=np.array(run.hold))
 

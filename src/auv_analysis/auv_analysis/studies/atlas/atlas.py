@@ -150,6 +150,7 @@ class Chart:
 
     def as_dict(self) -> dict[str, Any]:
         """All of it, ready for JSON; shares in %."""
+        arrays = ('M', 'N', 'Upsilon', 'Upsilon_inv', 'correlation')
         return {
             'source': self.source,
             'diagonal': self.is_diagonal,
@@ -157,11 +158,7 @@ class Chart:
             'largest_correlation_percent': 100 * self.largest,
             'pair_count': len(self.pairs),
             'pairs': [list(pair) for pair in self.pairs],
-            'M': self.M.tolist(),
-            'N': self.N.tolist(),
-            'Upsilon': self.Upsilon.tolist(),
-            'Upsilon_inv': self.Upsilon_inv.tolist(),
-            'correlation': self.correlation.tolist(),
+            **{key: getattr(self, key).tolist() for key in arrays},
             'velocity_shares_percent': (100 * self.velocity_shares).tolist(),
             'input_shares_percent': (100 * self.input_shares).tolist(),
             'structural_zeros': self.zeros,

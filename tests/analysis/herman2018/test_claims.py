@@ -14,7 +14,7 @@ from pyarrow import parquet
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.herman2018 import paper
 from auv_analysis.herman2018.claims import ROWS, Row, claims_part, judge_runs, write_claims
-from auv_analysis.herman2018.evidence import ErrorSensitivity, Evidence, Signals, grade
+from auv_analysis.herman2018.evidence import ErrorSensitivity, Evidence, Quotes, Signals, grade
 from auv_analysis.output.text import MISSING
 from auv_analysis.report.digest import digests
 from auv_analysis.runs.run import Run
@@ -367,7 +367,7 @@ class Experiment:
             for law in signals
         }  # fmt: skip
         N = np.array(paper.N) * (times if which[1] == 'N' else 1.0)
-        return self._row.judge(Evidence(signals, tuple(N), answers)).verdict
+        return self._row.judge(Evidence(signals, tuple(N), answers), Quotes()).verdict
 
     def flips(self, which: Asked, axis: int) -> Iterator[str]:
         """Factors from which on the verdict is another one."""
@@ -406,9 +406,10 @@ def test_what_each_row_says_of_runs_whose_every_column_is_like_no_others(approve
     }
     evidence = Evidence({law: Signals(run) for law, run in runs.items()}, tuple(N), answers)
     for number, row in enumerate(ROWS, start=1):
-        found = row.judge(evidence)
+        quote = Quotes()
+        found = row.judge(evidence, quote)
         approved.add([f'{number} | {found.verdict} | {found.ours} | {found.window}'])
-        approved.add(f'  {value.name} | {value.value:#.4g} {value.unit}' for value in found.values)
+        approved.add(f'  {value.name} | {value.value:#.4g} {value.unit}' for value in quote.values)
 
 
 @dataclass(frozen=True, eq=False)
@@ -458,4 +459,4 @@ def test_a_number_on_the_border_counts_as_the_criterion_says(number, gvc, cl, ve
     """'within' and 'at most' are with the border, 'above', 'below' and 'exceeds' without it."""
     run = SimpleNamespace(duration=30.0, settled=1.0)
     signals = {'gvc': Exact(run, gvc), 'cl': Exact(run, cl)}
-    assert ROWS[number - 1].judge(Evidence(signals, paper.N)).verdict == verdict
+    assert ROWS[number - 1].judge(Evidence(signals, paper.N), Quotes()).verdict == verdict

@@ -13,6 +13,7 @@ from auv_analysis.herman2018.evidence import (
     DECIDED,
     Claim,
     Evidence,
+    Quotes,
     Row,
     Signals,
     Value,
@@ -275,10 +276,11 @@ def _claim(index: int, row: Row, cases: Mapping[str, Evidence]) -> Claim:
     texts = index, row.claim, row.paper
     if verdict:
         return Claim(*texts, MISSING, verdict, row.criterion, reason, case, printed=row.printed)
-    found = row.judge(cases[case])
+    quote = Quotes()
+    found = row.judge(cases[case], quote)
     return Claim(
         *texts, found.ours, found.verdict, row.criterion, row.remark, case, found.window,
-        found.values, row.printed,
+        quote.values, row.printed,
     )  # fmt: skip
 
 

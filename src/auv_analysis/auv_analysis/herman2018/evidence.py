@@ -93,14 +93,12 @@ class Judgement(NamedTuple):
     ----------
     ours : our value as text
     verdict : by the criterion
-    values : every number of the text
     window : time that the numbers are of, in words
 
     """
 
     ours: str
     verdict: Verdict
-    values: tuple[Value, ...] = ()
     window: str = MISSING
 
 
@@ -207,7 +205,7 @@ class Row:
     Attributes
     ----------
     claim, paper, criterion, remark : as in `Claim`
-    judge : the finding from the evidence
+    judge : the finding from the evidence; what makes its numbers into text keeps them
     laws : whose runs, with the paper's gains, it needs
     cases : scenarios that it belongs to
     seconds : shortest run that decides it
@@ -220,7 +218,7 @@ class Row:
     claim: str
     paper: str
     criterion: str
-    judge: Callable[[Evidence], Judgement]
+    judge: Callable[[Evidence, Quotes], Judgement]
     laws: tuple[str, ...] = ('gvc',)
     cases: tuple[str, ...] = ('case1',)
     seconds: float = 0.0

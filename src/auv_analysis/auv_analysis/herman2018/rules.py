@@ -27,32 +27,31 @@ ERRORS = ('Δu', 'Δv', 'Δw', 'Δp', 'Δq', 'Δr')
 LUMPED = ('w_X', 'w_Y', 'w_Z', 'w_K', 'w_M', 'w_N')
 
 
-def errors_vanish(of: Evidence) -> Judgement:
+def errors_vanish(of: Evidence, quote: Quotes) -> Judgement:
     """Row 1: GVC errors near zero after 2 s."""
-    gvc, quote = of.gvc, Quotes()
+    gvc = of.gvc
     late = gvc.late_peak('error')
     within = quote('near zero', NEAR_ZERO, 'm/s, rad/s', short)
     when = settled(quote, 'gvc', gvc.run, 'after ')
     most = quote('largest error after the transient, gvc', late.max(), 'm/s, rad/s', 2)
     text = f'within {within}: {when}; at most {most} after {_transient(quote)} s'
-    return Judgement(text, grade([late.max() <= NEAR_ZERO]), quote.values, _late(of))
+    return Judgement(text, grade([late.max() <= NEAR_ZERO]), _late(of))
 
 
-def linear_slow(of: Evidence) -> Judgement:
+def linear_slow(of: Evidence, quote: Quotes) -> Judgement:
     """Row 2: du and dw of CL."""
     gvc, cl = (run.late_peak('error')[[U, W]] for run in of.both)
-    quote = Quotes()
     text = (
         f'after {_transient(quote)} s up to {quote.listed(_of("cl", ERRORS, U, W), cl, "m/s")} '
         f'm/s (GVC {quote.listed(_of("gvc", ERRORS, U, W), gvc, "m/s", 2)})'
     )
     verdict = grade((cl > NEAR_ZERO) & (cl > FAR * gvc))
-    return Judgement(text, verdict, quote.values, _late(of))
+    return Judgement(text, verdict, _late(of))
 
 
-def pitch_slow(of: Evidence) -> Judgement:
+def pitch_slow(of: Evidence, quote: Quotes) -> Judgement:
     """Row 3: dq of CL."""
-    cl, quote = of.cl, Quotes()
+    cl = of.cl
     end = min(10.0, cl.run.duration)
     early = cl.peak('error', TRANSIENT, end)[Q]
     late = cl.late_peak('error')[Q]
@@ -66,12 +65,12 @@ def pitch_slow(of: Evidence) -> Judgement:
         f'{quote("Δq, cl, in the last third", last, "rad/s", 2)} in the last third'
     )
     ends = (TRANSIENT, end), (TRANSIENT, cl.run.duration), (last_third(cl.run), cl.run.duration)
-    return Judgement(text, grade([late > NEAR_ZERO, last > NEAR_ZERO]), quote.values, spell(*ends))
+    return Judgement(text, grade([late > NEAR_ZERO, last > NEAR_ZERO]), spell(*ends))
 
 
-def largest_errors(of: Evidence) -> Judgement:
+def largest_errors(of: Evidence, quote: Quotes) -> Judgement:
     """Row 4: which errors of GVC are largest."""
-    peak, quote = of.gvc.peak('error'), Quotes()
+    peak = of.gvc.peak('error')
     names = _of('gvc', ERRORS)
     text = (
         f'peaks {quote.listed(names[:3], peak[:3], "m/s", 2)} m/s; '
@@ -79,12 +78,12 @@ def largest_errors(of: Evidence) -> Judgement:
     )
     linear = min(peak[U], peak[W]) > FAR * peak[V]
     verdict = grade([linear, peak[Q] > max(peak[P], peak[R]), peak[P] > 0.01 * peak[Q]])
-    return Judgement(text, verdict, quote.values, _whole(of))
+    return Judgement(text, verdict, _whole(of))
 
 
-def lumped_fast(of: Evidence) -> Judgement:
+def lumped_fast(of: Evidence, quote: Quotes) -> Judgement:
     """Row 5: w of GVC becomes small and not zero."""
-    gvc, quote = of.gvc, Quotes()
+    gvc = of.gvc
     ratio = gvc.late_peak('lumped_error') / gvc.peak('lumped_error')
     end, F = gvc.part('lumped_error').last, gvc.peak('F')
     left = quote('largest w after the transient, of its peak', 100 * ratio.max(), '%', decimals(1))
@@ -96,12 +95,12 @@ def lumped_fast(of: Evidence) -> Judgement:
     )
     ends = bool((np.abs(end) > 0.01 * F)[[U, W]].any())
     verdict = grade([ratio.max() < 1 / FAR, ends])
-    return Judgement(text, verdict, quote.values, f'{_late(of)}; at {gvc.run.duration:g} s')
+    return Judgement(text, verdict, f'{_late(of)}; at {gvc.run.duration:g} s')
 
 
-def lumped_slow(of: Evidence) -> Judgement:
+def lumped_slow(of: Evidence, quote: Quotes) -> Judgement:
     """Row 6: w of CL stays large and moves on."""
-    axes, quote = [U, W, Q], Quotes()
+    axes = [U, W, Q]
     gvc, cl = (run.late_peak('lumped_error')[axes] for run in of.both)
     span, F_span = (of.cl.last_third(name).span[axes] for name in ('lumped_error', 'F'))
     names = _of('cl', LUMPED, *axes)
@@ -114,12 +113,12 @@ def lumped_slow(of: Evidence) -> Judgement:
     )
     ends = (TRANSIENT, of.cl.run.duration), (last_third(of.cl.run), of.cl.run.duration)
     verdict = grade([*(cl > FAR * gvc), *(span > 0.5 * F_span)])
-    return Judgement(text, verdict, quote.values, spell(*ends))
+    return Judgement(text, verdict, spell(*ends))
 
 
-def lumped_first_phase(of: Evidence) -> Judgement:
+def lumped_first_phase(of: Evidence, quote: Quotes) -> Judgement:
     """Row 7: w of GVC in the first phase."""
-    gvc, quote = of.gvc, Quotes()
+    gvc = of.gvc
     first, late = gvc.peak('lumped_error', 0.0, TRANSIENT), gvc.late_peak('lumped_error')
     named = [U, W, Q, R]
     before, after = ([f'{LUMPED[i]} {when}' for i in named] for when in ('at first', 'later'))
@@ -130,18 +129,18 @@ def lumped_first_phase(of: Evidence) -> Judgement:
     larger = [min(first[U], first[W]) > first[V], min(first[Q], first[R]) > first[P]]
     verdict = grade([*(first[named] > FAR * late[named]), *larger])
     window = spell((0.0, TRANSIENT), (TRANSIENT, gvc.run.duration))
-    return Judgement(text, verdict, quote.values, window)
+    return Judgement(text, verdict, window)
 
 
-def disturbance_sizes(of: Evidence) -> Judgement:
+def disturbance_sizes(of: Evidence, quote: Quotes) -> Judgement:
     """Row 8: sizes of F."""
-    F, quote, one = of.gvc.peak('F'), Quotes(), decimals(1)
+    F, one = of.gvc.peak('F'), decimals(1)
     text = (
         f'peaks F_X {quote("F_X", F[U], "N", one)}, F_Z {quote("F_Z", F[W], "N", one)} N, '
         f'F_M {quote("F_M", F[Q], "N m", one)}, F_N {quote("F_N", F[R], "N m", one)} N m'
     )
     verdict = grade([F[W] == max(F[:3]), F[Q] == max(F[3:]), F[R] < F[Q]])
-    return Judgement(text, verdict, quote.values, _whole(of))
+    return Judgement(text, verdict, _whole(of))
 
 
 def _of(law: str, names: tuple[str, ...], *axes: int) -> list[str]:
@@ -166,9 +165,9 @@ POINTS = 1.0  # percentage points of a share
 COMPONENTS = tuple(f'ξ{i}' for i in range(1, 7))
 
 
-def kinetic_energy_mean(of: Evidence) -> Judgement:
+def kinetic_energy_mean(of: Evidence, quote: Quotes) -> Judgement:
     """Row 9: total kinetic energy, a mean over a window that the paper does not print."""
-    windows, quote = _windows(of.gvc), Quotes()
+    windows = _windows(of.gvc)
     text = '; '.join(
         f'{quote(f"kinetic energy, 0–{end:g} s", float(part.sum()), "J", decimals(2))} J '
         f'({_window(quote, end)})'
@@ -176,62 +175,60 @@ def kinetic_energy_mean(of: Evidence) -> Judgement:
     )
     named = spell(*((0.0, end) for end in windows))
     if of.gvc.run.duration < paper.ENERGY_WINDOW:
-        return Judgement(text, 'not evaluated', quote.values, named)
+        return Judgement(text, 'not evaluated', named)
     total = next(iter(windows.values())).sum()
     near = abs(total / paper.KINETIC_ENERGY - 1.0) <= WITHIN
-    return Judgement(text, 'partly' if near else 'not reproduced', quote.values, named)
+    return Judgement(text, 'partly' if near else 'not reproduced', named)
 
 
-def kinetic_energy_shares(of: Evidence) -> Judgement:
+def kinetic_energy_shares(of: Evidence, quote: Quotes) -> Judgement:
     """Row 10: shares of the components."""
     windows = {end: shares(part) for end, part in _windows(of.gvc).items()}
-    quote = Quotes()
     lines = []
     for end, part in windows.items():
         names = [f'share of {name}, 0–{end:g} s' for name in COMPONENTS]
         lines.append(f'{quote.listed(names, part, "%", decimals(2))} % ({_window(quote, end)})')
     named = spell(*((0.0, end) for end in windows))
     if of.gvc.run.duration < paper.ENERGY_WINDOW:
-        return Judgement('; '.join(lines), 'not evaluated', quote.values, named)
+        return Judgement('; '.join(lines), 'not evaluated', named)
     near = [np.abs(part - paper.SHARES).max() <= POINTS for part in windows.values()]
-    return Judgement('; '.join(lines), grade(near), quote.values, named)
+    return Judgement('; '.join(lines), grade(near), named)
 
 
-def energy_in_two(of: Evidence) -> Judgement:
+def energy_in_two(of: Evidence, quote: Quotes) -> Judgement:
     """Row 16: energy mainly in xi_3 and xi_1."""
-    part, quote = shares(of.gvc.part('energy').mean), Quotes()
+    part = shares(of.gvc.part('energy').mean)
     order = np.argsort(part)[::-1]
     first = quote('component with the largest share', int(order[0]) + 1, '', short)
     second = quote('component with the second share', int(order[1]) + 1, '', short)
     together = quote('their share', float(part[order[:2]].sum()), '%', decimals(2))
     text = f'ξ{first} and ξ{second}, together {together} %'
     verdict = grade([tuple(order[:2]) == (2, 0), bool(part[[0, 2]].sum() > 99.0)])
-    return Judgement(text, verdict, quote.values, _whole(of))
+    return Judgement(text, verdict, _whole(of))
 
 
-def sway_deformed(of: Evidence) -> Judgement:
+def sway_deformed(of: Evidence, quote: Quotes) -> Judgement:
     """Row 11: delta_xi of sway."""
-    peak, quote = of.gvc.peak('delta_xi'), Quotes()
+    peak = of.gvc.peak('delta_xi')
     text = f'{quote("Δξ2", peak[V], "m/s", 2)} m/s'
     verdict = grade([peak[V] == max(peak[:3]) and round(peak[V], 2) == paper.SWAY_DEFORMATION])
-    return Judgement(text, verdict, quote.values, _whole(of))
+    return Judgement(text, verdict, _whole(of))
 
 
-def roll_deformed(of: Evidence) -> Judgement:
+def roll_deformed(of: Evidence, quote: Quotes) -> Judgement:
     """Row 12: delta_xi of roll."""
     peak, rate = of.gvc.peak('delta_xi'), of.gvc.peak('nu')[P]
-    quote = Quotes()
     text = (
         f'{quote("Δξ4", peak[P], "rad/s")} rad/s, where p itself reaches '
         f'{quote("p", rate, "rad/s", 2)} rad/s'
     )
     verdict = grade([peak[P] == max(peak[3:]) and peak[P] > rate])
-    return Judgement(text, verdict, quote.values, _whole(of))
+    return Judgement(text, verdict, _whole(of))
 
 
-def pitch_input(of: Evidence) -> Judgement:
+def pitch_input(of: Evidence, quote: Quotes) -> Judgement:
     """Row 13: delta_pi of pitch."""
-    gvc, quote = of.gvc, Quotes()
+    gvc = of.gvc
     peak = gvc.peak('delta_pi')
     text = f'pitch {quote("Δπ5", peak[Q], "N m")} N m'
     if gvc.run.duration > TRANSIENT:
@@ -241,12 +238,12 @@ def pitch_input(of: Evidence) -> Judgement:
         f'; roll {quote("Δπ4", peak[3], "N m", 2)}, yaw {quote("Δπ6", peak[5], "N m", 2)} N m; '
         f'forces at most {quote("largest of Δπ1 to Δπ3", peak[:3].max(), "N", 2)} N'
     )
-    return Judgement(text, grade([_only_pitch(gvc)]), quote.values, _whole(of))
+    return Judgement(text, grade([_only_pitch(gvc)]), _whole(of))
 
 
-def pitch_sensitive(of: Evidence) -> Judgement:
+def pitch_sensitive(of: Evidence, quote: Quotes) -> Judgement:
     """Row 15: whether pitch is coupled most, and follows the others and the gains most."""
-    quote, parts, lines = Quotes(), [_only_pitch(of.gvc)], []
+    parts, lines = [_only_pitch(of.gvc)], []
     for what, words in (('others', 'the other set-points'), ('gains', 'the gains')):
         six = {law: getattr(of.responses[law], what) for law in ('gvc', 'cl')}
         texts = ', '.join(_largest(quote, law, words, values) for law, values in six.items())
@@ -258,15 +255,14 @@ def pitch_sensitive(of: Evidence) -> Judgement:
         f'{quote("largest other Δπ", np.delete(peak, Q).max(), "N, N m", 2)}'
     )
     text = '; '.join([coupled, *lines])
-    return Judgement(text, grade(parts), quote.values, _whole(of))
+    return Judgement(text, grade(parts), _whole(of))
 
 
-def decomposition(of: Evidence) -> Judgement:
+def decomposition(of: Evidence, quote: Quotes) -> Judgement:
     """Row 21: N."""
-    quote = Quotes()
     text = quote.listed([f'N{i}' for i in range(1, 7)], of.N, 'kg, kg m2', 6)
     verdict = grade([np.array_equal(np.round(of.N, 1), paper.N)])
-    return Judgement(text, verdict, quote.values, 'no time in it')
+    return Judgement(text, verdict, 'no time in it')
 
 
 def _only_pitch(gvc: Signals) -> bool:
@@ -301,44 +297,44 @@ COMPARABLE = 0.05  # of efforts that are 'comparable'
 INPUTS = ('τ_X', 'τ_Y', 'τ_Z', 'τ_K', 'τ_M', 'τ_N')
 
 
-def inputs_similar(of: Evidence) -> Judgement:
+def inputs_similar(of: Evidence, quote: Quotes) -> Judgement:
     """Row 14: inputs of both laws with the same gains."""
     gvc, cl = (run.peak('tau') for run in of.both)
-    change, quote = _rms_change(of), Quotes()
+    change = _rms_change(of)
     text = f'peak {_pairs(quote, gvc[[U, W]], cl[[U, W]])}; {_changes(quote, change)}'
     window = spell((0.0, of.gvc.run.duration), (TRANSIENT, of.gvc.run.duration))
     if np.abs(change).max() > SLIGHTLY:
-        return Judgement(text, 'not reproduced', quote.values, window)
+        return Judgement(text, 'not reproduced', window)
     same_peak = np.abs(_change(gvc, cl)).max() <= SLIGHTLY
-    return Judgement(text, 'reproduced' if same_peak else 'partly', quote.values, window)
+    return Judgement(text, 'reproduced' if same_peak else 'partly', window)
 
 
-def earlier(of: Evidence) -> Judgement:
+def earlier(of: Evidence, quote: Quotes) -> Judgement:
     """Row 17: time to the final errors."""
-    times, quote = [run.run.settled for run in of.both], Quotes()
+    times = [run.run.settled for run in of.both]
     both = zip(('gvc', 'cl'), of.both, strict=True)
     text = ' against '.join(settled(quote, law, run.run) for law, run in both)
     text += f' to {quote("near zero", NEAR_ZERO, "m/s, rad/s", short)}'
-    return Judgement(text, grade([times[0] < times[1]]), quote.values, _whole(of))
+    return Judgement(text, grade([times[0] < times[1]]), _whole(of))
 
 
-def oscillates(of: Evidence) -> Judgement:
+def oscillates(of: Evidence, quote: Quotes) -> Judgement:
     """Row 18: total variation of the errors."""
     gvc, cl = (run.part('error').path for run in of.both)
     seen = np.maximum(*(run.peak('error') for run in of.both)) > NEAR_ZERO
-    quote, units = Quotes(), ('m/s',) * 3 + ('rad/s',) * 3
+    units = ('m/s',) * 3 + ('rad/s',) * 3
     text = '; '.join(
         f'{ERRORS[i]} {quote(f"path of {ERRORS[i]}, cl", cl[i], units[i], 2)} against '
         f'{quote(f"path of {ERRORS[i]}, gvc", gvc[i], units[i], 2)}'
         for i in np.flatnonzero(seen).tolist()
     )
     text = f'total variation, CL against GVC: {text}'
-    return Judgement(text, grade(cl[seen] > gvc[seen]), quote.values, _whole(of))
+    return Judgement(text, grade(cl[seen] > gvc[seen]), _whole(of))
 
 
-def efforts_comparable(of: Evidence) -> Judgement:
+def efforts_comparable(of: Evidence, quote: Quotes) -> Judgement:
     """Row 19: RMS of the inputs after 2 s, per axis."""
-    change, quote = _rms_change(of), Quotes()
+    change = _rms_change(of)
     near = np.abs(change) <= COMPARABLE
     of_gvc, of_cl = (
         quote.listed([f'RMS of {name}, {law}' for name in INPUTS], run.late_rms('tau'), 'N, N m')
@@ -348,15 +344,14 @@ def efforts_comparable(of: Evidence) -> Judgement:
     verdict: Verdict = (
         'reproduced' if near.all() else 'partly' if near.sum() >= 4 else 'not reproduced'
     )
-    return Judgement(text, verdict, quote.values, spell((TRANSIENT, of.gvc.run.duration)))
+    return Judgement(text, verdict, spell((TRANSIENT, of.gvc.run.duration)))
 
 
-def larger_start(of: Evidence) -> Judgement:
+def larger_start(of: Evidence, quote: Quotes) -> Judgement:
     """Row 20: inputs of the first instants."""
     gvc, cl = (run.peak('tau', 0.0, TRANSIENT)[[U, W]] for run in of.both)
-    quote = Quotes()
     text, window = _pairs(quote, gvc, cl), spell((0.0, min(TRANSIENT, of.gvc.run.duration)))
-    return Judgement(text, grade(gvc > cl), quote.values, window)
+    return Judgement(text, grade(gvc > cl), window)
 
 
 def _pairs(quote: Quotes, gvc: np.ndarray, cl: np.ndarray) -> str:

@@ -395,6 +395,8 @@ def test_products_with_u_of_gazebo_are_lift(imported):
     # x stays and z turns from FLU; y with y, and pitch with heave, turn both
     assert found == {(1, 1): 3.0, (5, 5): 4.0, (4, 2): 2.0, (2, 2): 1.0, (0, 2): 2.0}
     assert any('nRU, mUW' in text for text in document['traps'])
+    feeds, _ = imported('a.sdf', sdf(more='<nRU>4</nRU>'))
+    assert feeds.lift[5, 5] == -4.0
 
 
 def test_settings_of_the_plugin_that_gazebo_follows_and_we_do_not_are_reported(imported):
@@ -431,6 +433,12 @@ def test_a_model_of_classic_gazebo_has_its_body_in_sdf(imported):
     moved = URDF.replace('xyz="0 0 0"', 'xyz="0.1 0.2 0.3"')
     assert_same(vehicle, imported('a.urdf', moved)[0])
     assert document['vehicle']['name'] == 'made'
+    assert not any('the tensor is turned' in text for text in document['traps'])
+    hull = '<link name="hull"><inertial><mass>9</mass></inertial></link>'
+    fleet = f'<sdf version="1.6">{text}<model name="boat">{hull}</model></sdf>'
+    beside, document = imported('fleet.sdf', fleet)
+    assert_same(beside, vehicle)
+    assert not any('other links' in text for text in document['assumed'])
     turned = text.replace('0.1 0.2 0.3 0 0 0', f'0.1 0.2 0.3 0 0 {np.pi / 2}')
     found, document = imported('turned.sdf', f'<sdf version="1.6">{turned}</sdf>')
     given = np.array([[525.39, 1.44, 33.41], [1.44, 794.20, 2.6], [33.41, 2.6, 691.23]])
@@ -504,6 +512,8 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
         '<pose>0 0 0.05', '<pose relative_to="f0">0 0 0.05'), [], 'or behind 100 others'),
     'xacro': ('a.urdf', URDF.replace('1.83826', '${volume}'), [], 'expand xacro first'),
     'positive damping': ('a.yaml', REXROV.replace('[-74.82', '[74.82'), [], 'damping.linear'),
+    'damping that feeds by the sign that was told': (
+        'a.yaml', REXROV, ['--sign', 'positive'], 'damping.linear: expected positive'),
     'unknown entry': ('a.yaml', f'{REXROV}colour: red\n', [], 'colour'),
     'scaled': ('a.yaml', f'{REXROV}scaling_damping: 2\n', [], 'scaling_damping'),
     'twice, by two names': (
@@ -525,6 +535,7 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
     'a row of words': ('a.m', BLUEROV2 + 'Yrdot  -1.93', LIST, 'Yrdot: expected Yrdot = a'),
     'a row of a table': ('a.m', BLUEROV2 + '| Yp | -1.93 |', LIST, 'Yp: expected Yp = a number'),
     'coefficients of a shape': ('a.yaml', f'{REXROV}type: box\n', [], 'type: expected fossen'),
+    'of a round one': ('a.yaml', f'{REXROV}type: Spheroid\n', [], 'type: expected fossen'),
     'numbers that do not count': (
         'a.sdf', sdf().replace('<inertial>', '<inertial auto="true">'), [], 'link.inertial.auto'),
     'nondimensional': ('a.m', BLUEROV2 + "Xvv' = 0.01", [], 'a prime'),

@@ -19,7 +19,7 @@ def test_who_ends_is_named_with_its_last_words_and_what_the_others_complain_of(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     group = supervisor.Supervisor(tmp_path, os.environ)
-    said = '; '.join(f'echo "[ERROR] [1.0] [other]: {word}"' for word in ('first', 'second'))
+    said = '; '.join(f'echo "[ERROR] [1.0] [other]: {word}" >&2' for word in ('first', 'second'))
     group.start('other', ['sh', '-c', f'{said}; echo well; exec sleep 600'])
     group.start('quiet', ['sleep', '600'])
     log, lines = tmp_path / 'other.log', '; '.join(f'echo line {k}' for k in range(10))

@@ -166,11 +166,11 @@ ENTRIES = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
 
 def inertia_entries(texts: Mapping[str, str], R: np.ndarray, path: object, key: str) -> list[float]:
     """Entries ixx ... izz of a tensor in the axes of its link, which R turns it into."""
-    given = [numbers(texts.get(name, '0'), 1, path, f'{key}.{name}')[0] for name in ENTRIES]
-    xx, xy, xz, yy, yz, zz = given
+    xx, xy, xz, yy, yz, zz = (
+        numbers(texts.get(name, '0'), 1, path, f'{key}.{name}')[0] for name in ENTRIES
+    )
     turned = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
-    upper = [float(turned[i, j]) for i in range(3) for j in range(i, 3)]
-    return upper if np.any(np.eye(3) != R) else given
+    return [float(turned[i, j]) for i in range(3) for j in range(i, 3)]
 
 
 def put_rigid_body(

@@ -195,7 +195,7 @@ def test_of_indices_that_do_not_exist_it_is_said_that_there_are_none(
 @pytest.mark.parametrize(
     ('scenario', 'varied', 'noisy'),
     [
-        ('sensors: {velocity_noise: 0.01}', '', True),
+        ('sensors: {velocity_noise: [0, 0, 0, 0, 0, 0.01]}', '', True),
         ('sensors: {velocity_noise: 0.0, drop_out: 0.0}', '', False),
         ('sensors: {drop_out: 0.0}', 'sensors.drop_out: {uniform: {from: 0.0, to: 0.5}}', True),
         ('faults: [{kind: wrench_loss, from: 0.1, probability: 0.5}]', '', True),

@@ -62,6 +62,12 @@ def holed(
 def test_samples_stop_and_begin_again_where_any_topic_does(run, tmp_path) -> None:
     found = holed(run, tmp_path, (1.0, 1.5), (3.0, 3.8))
     assert_allclose(found.gaps, [[1.0, 1.5], [3.0, 3.8]], atol=1e-9)
+    early, late = found.gaps
+    for keep, gaps in (
+        (found.t < 3.1, (early,)), (found.t > 1.1, (late,)), (found.t < 3.9, (early, late)),
+        (found.t < 0.0, ()),
+    ):  # fmt: skip
+        assert found.part(keep).gaps == gaps
     inside = ((run.t > 1.005) & (run.t < 1.495)) | ((run.t > 3.005) & (run.t < 3.795))
     assert_allclose(found.t, run.t[~inside], atol=1e-9)
     assert_allclose(found.nu, run.nu[~inside], atol=1e-9)

@@ -19,6 +19,7 @@ from auv_analysis.cli import main, scenario_runs
 from auv_analysis.graph import recorded_runs
 from auv_analysis.output.folder import (
     check_free,
+    discard,
     has_links,
     listed_in,
     results_folder,
@@ -232,6 +233,17 @@ def test_of_what_replaces_results_a_failure_leaves_rollouts_and_summaries_alone(
         assert (tmp_path / 'unfinished' / name).is_file() == kept
         assert EARLIER.items() <= tree(tmp_path).items()
         shutil.rmtree(tmp_path / 'unfinished', ignore_errors=True)
+
+
+def test_half_a_file_is_discarded_with_the_results_that_it_lies_beside(tmp_path) -> None:
+    left = tmp_path / 'left'
+    fill(left, {'.b.json.unfinished': '{'})
+    discard(left)
+    assert tree(left) == {'.b.json.unfinished': '{'}, 'it may be of somebody'
+    fill(left, {'a.json': 'x'})
+    write_manifest(left, {'a.json': sha256_of(left / 'a.json'), 'gone.json': 'never written'})
+    discard(left)
+    assert not left.exists()
 
 
 def test_a_file_where_a_folder_must_go_stops_the_exchange_before_it_begins(tmp_path) -> None:

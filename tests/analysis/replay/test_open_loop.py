@@ -274,6 +274,9 @@ def test_behind_a_hole_of_lock_step_nothing_is_reproduced(tmp_path: Path) -> Non
     found = reproduction(loop, open_loop(loop, 'gvc', GAINS))
     assert (found.holds, found.missing) == (False, COUNT - 30)
     assert found.sentence() == 'NOT reproduced: 10 recorded wrenches are not answered again'
+    ns, tau = loop.series['wrench']
+    still = replace(loop, series={**loop.series, 'wrench': (ns, 0.0 * tau)})
+    assert reproduction(still, open_loop(loop, 'gvc', GAINS)).missing == found.missing
     free = recorded_loop(write(tmp_path / 'free.mcap', params=REAL_TIME))
     assert reproduction(free, open_loop(free, 'gvc', GAINS)).missing == 0
 

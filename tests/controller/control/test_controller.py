@@ -365,6 +365,7 @@ def test_silence_of_set_points_does_not_wait_for_an_odometry():
     assert [answer is not None for answer in said] == [
         880 < ms < 1120 for ms in range(400, 1200, 20)
     ]
+    assert {answer.ns for answer in said if answer} == {390 * MS}, 'the last odometry'
     wrenches = [answer.tau[0] for answer in said if answer]
     assert sorted(wrenches, key=abs, reverse=True) == wrenches
     assert wrenches[0] != wrenches[-1] == 0.0

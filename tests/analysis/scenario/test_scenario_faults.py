@@ -35,6 +35,16 @@ def written(folder: Path, faults: list, **changes) -> Path:
     return path
 
 
+@pytest.mark.parametrize(('faults', 'changes', 'senses', 'acts'), [
+    ([], {}, False, True), ([], {'actuators': None}, False, False),
+    ([], {'actuators': None, 'sensors': {'drop_out': 0.1}}, True, False),
+    ([DROP], {'actuators': None}, True, False), ([WEAK], {'actuators': None}, False, True),
+])  # fmt: skip
+def test_what_is_between_law_and_vehicle(tmp_path, faults, changes, senses, acts) -> None:
+    scenario = load_scenario(written(tmp_path, faults, **changes))
+    assert (scenario.senses, scenario.acts) == (senses, acts)
+
+
 @pytest.mark.parametrize(
     ('faults', 'key', 'expected', 'found'),
     [

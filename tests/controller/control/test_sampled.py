@@ -169,6 +169,33 @@ def test_answers_of_another_size_are_refused_by_the_name_of_the_law(tau, f, rate
         one.sample(1.0, 1.0, zero, ATTITUDE, zero, zero)
 
 
+class Told(NamedTuple):
+    """Gains of a law that says what it was told."""
+
+    STATES = 6
+
+    k: float
+
+    @staticmethod
+    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        tau = np.array(nu) + 2 * np.array(nu_d) + 4 * np.array(nu_d_dot) + 8 * np.array(state)
+        return tau, (*attitude, t, gains.k)
+
+    @staticmethod
+    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        return np.array(nu) + 2 * np.array(nu_d) + 4 * np.array(nu_d_dot) + state[0] + t + gains.k
+
+
+def test_a_law_of_ones_own_is_told_each_quantity_in_its_place():
+    one, state = SampledLaw(Told(3.0), control_model(load_vehicle('rexrov'))), np.zeros(6)
+    for k in range(3):
+        seen = NU[k] + 2 * NU_D[k] + 4 * NU_D_DOT[k]
+        tau, f = sample(one, k, steps(k))
+        assert_allclose(tau, seen + 8 * state)
+        assert_allclose(f, [*ATTITUDE, TIMES[k], 3.0])
+        state = state + steps(k + 1) * (seen + state[0] + TIMES[k] + 3.0)
+
+
 @pytest.mark.parametrize(
     ('raised', 'text'),
     [

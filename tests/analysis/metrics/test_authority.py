@@ -1,12 +1,14 @@
 """Commands above the weight, above the thrusters, and where there are none, are remarked on."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import yaml
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis.cli.main import main
-from auv_analysis.metrics.authority import beyond_authority
+from auv_analysis.metrics.authority import beyond_authority, both_ways
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.vehicle.thrusters import Thrusters
@@ -66,6 +68,13 @@ def test_a_propeller_weaker_astern_is_judged_astern(least, most, text) -> None:
     largest = [np.nan_to_num(max(abs(least), abs(most))), 0, 0, 0, 0, 0]
     found = beyond_authority(vehicle, largest, ways)
     assert [line.partition('give: ')[2].replace('\N{MINUS SIGN}', '-') for line in found] == text
+
+
+def test_both_ways_are_those_of_the_whole_run() -> None:
+    blocks = [SimpleNamespace(tau=np.outer(u, np.arange(1.0, 7.0))) for u in ([2, -1], [5, 3])]
+    least, most = both_ways(SimpleNamespace(blocks=lambda: blocks))
+    assert_array_equal(least, -np.arange(1.0, 7.0))
+    assert_array_equal(most, 5 * np.arange(1.0, 7.0))
 
 
 def test_without_thrusters_only_the_weight_is_known() -> None:

@@ -411,6 +411,7 @@ def test_what_a_silent_publisher_left_ahead_is_not_obeyed_when_another_begins(ac
         bench.odometry(ms)
     for ms in range(1000, 2000, 10):
         bench.pairing.derivative((ms - 7) * MS, stop)  # which may come first
+        bench.odometry(ms - 5)
         bench.pairing.setpoint((ms - 7) * MS, stop, ms / 1000)
         assert bench.odometry(ms).trouble == ''
         assert bench.pairing.find(ms * MS).nu_d == stop

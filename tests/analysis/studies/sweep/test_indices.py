@@ -170,6 +170,7 @@ def test_of_fewer_than_eight_trajectories_there_are_no_indices(tmp_path: Path, c
         [(path, 8, 8) for path in (A, B, C)] if count == 8 else []
     )
     assert ('no indices' in ' '.join(results.notes)) is (count == 7)
+    assert ' cases' not in ' '.join(results.notes), 'there is one'
 
 
 def test_of_indices_that_do_not_exist_it_is_said_that_there_are_none(

@@ -162,6 +162,8 @@ def test_a_law_that_is_changed_while_inactive_is_taken(made, vehicle) -> None:
     answers_as(made, 'cl', PER_AXIS, STEPS)
     change(node, law='gvc', gains__k_D=[7.0])
     answers_as(made, 'gvc', PER_AXIS | {'k_D': [7.0]}, 2 * STEPS)
+    change(node, law='pid', gains__k_P=[5e3])  # its other gains have defaults
+    assert {*json.loads(node.graph.facts['gains'])} == {'k_P', 'k_I', 'k_D'}
 
 
 @pytest.mark.parametrize(('before', 'after'), [('gvc', 'pid'), ('pid', 'smc'), ('smc', 'cl')])
@@ -446,6 +448,20 @@ def test_an_answer_that_is_held_back_is_zero_where_the_controller_leaves(
     assert {tuple(by_hand.six_of(message)) for message in made.heard['wrench']} == {(0.0,) * 6}
     assert by_hand.ns_of(made.heard['wrench'][0]) == 3 * STEP
     assert not re.search('takes over|lets go', capfd.readouterr().err)
+
+
+def test_in_lock_step_the_law_goes_on_from_an_answer_that_is_held_back(made, vehicle) -> None:
+    node = controller(made, vehicle, 'gvc', expected_subscribers=['wrench=2'])
+
+    def join() -> None:
+        made.until(lambda: node._held, 'an answer')
+        made.listen(topics.WRENCH)
+
+    for k in range(STEPS):
+        offered(made, k, join if k == 0 else lambda: None)
+    found = {by_hand.ns_of(one) // STEP: by_hand.six_of(one) for one in made.heard['wrench']}
+    for k, (tau, _) in enumerate(expected('gvc', PER_AXIS, 0, STEPS)):
+        assert_allclose(found[k], tau, rtol=1e-9)
 
 
 def test_in_real_time_a_law_begins_once_it_is_heard(made, vehicle) -> None:

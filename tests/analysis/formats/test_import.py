@@ -415,13 +415,16 @@ def test_settings_of_the_plugin_that_gazebo_follows_and_we_do_not_are_reported(i
 
 
 @pytest.mark.parametrize(
-    ('name', 'said'), [('made', False), (' made::base_link', False), ('b', True)]
+    ('name', 'said'),
+    [('made', False), (' made::base_link', False), ('b', True), ('b</enable><enable>made', False)],
 )
 def test_a_model_that_gazebo_does_not_let_float_is_reported(imported, name, said):
     density = '<uniform_fluid_density>'
     text = sdf().replace(density, f'<enable>{name}</enable>{density}')
     _, document = imported('a.sdf', text)
     assert any(text.startswith('enable: ') for text in document['traps']) == said
+    _, document = imported('b.sdf', sdf())
+    assert not any(text.startswith('enable: ') for text in document['traps']), 'whoever can, does'
 
 
 def test_a_model_of_classic_gazebo_has_its_body_in_sdf(imported):

@@ -1,5 +1,6 @@
 """Bags without the beginning, the end or the middle of a run, or with a plant that was reset."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +57,9 @@ def test_the_time_of_a_bag_without_its_beginning_is_that_of_the_run(tmp_path: Pa
     assert said(run, 'begins at 0.3 s')
     assert not said(whole, 'begins')
     assert not said(whole, 'ends')
+    nothing = np.full_like(whole.disturbance_estimate, np.nan)
+    assert whole.extent.knows_disturbance
+    assert not replace(whole, disturbance_estimate=nothing).extent.knows_disturbance
     assert whole.unrecorded == {'measured', 'applied'}, 'faults of both, and neither topic'
     reason = 'the law had begun before the first sample: z is not known'
     assert reason in summarize(run)['lyapunov']['reason']

@@ -277,7 +277,8 @@ def test_a_list_names_mass_and_water_as_papers_do(imported):
     assert vehicle.weight == pytest.approx(10 * 3.71)
     assert vehicle.buoyancy == pytest.approx(1030 * 3.71 * 0.02)
     assert vehicle.r_G[2] == 0.02
-    turning, _ = imported('list.m', f'{BLUEROV2}Yr = -0.5', *LIST)
+    twice = f'{BLUEROV2}Yr = -0.5; X_uu = -18.18'  # one value by two names
+    turning, _ = imported('list.m', twice, *LIST)
     assert (turning.D_linear[1, 5], turning.D_linear[5, 1]) == (0.5, 0.0)
     assert_array_equal(np.diagonal(vehicle.M_RB)[3:], 0.16)
     text = BLUEROV2.replace('m = 11.5; W = 112.8', 'm = 10; W = 98.3')

@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -205,6 +206,24 @@ def test_overwrite_follows_no_link_out_of_the_folder(tmp_path: Path) -> None:
     (out / 'summary.json').symlink_to(elsewhere / 'summary.json')
     refused(out, overwrite=True)
     assert tree(elsewhere) == {'nu.png': 'old', 'summary.json': 'old'}
+
+
+def test_what_cannot_be_written_is_refused_by_what_the_system_says(tmp_path, monkeypatch) -> None:
+    (tmp_path / 'file').write_text('')
+    folder = '--out: expected a folder that can be written, found'
+    beside = tmp_path / 'file/made/out'
+    assert refused(beside, overwrite=False) == f'{beside}: {folder} not a directory'
+    with pytest.raises(InputError) as caught:
+        write_text(beside, 'text', overwrite=False)
+    expected = '--out: expected a file that can be written, found not a directory'
+    assert str(caught.value) == f'{beside}: {expected}'
+
+    def fail(*, dir: Path) -> None:
+        raise PermissionError(13, 'Permission denied', str(dir))
+
+    monkeypatch.setattr(tempfile, 'TemporaryFile', fail)
+    out = tmp_path / 'out'
+    assert refused(out, overwrite=False) == f'{out}: {folder} permission denied'
 
 
 ENDS = [KeyboardInterrupt(), OSError(28, 'No space left'), InputError('x', '', 'y', 'z')]

@@ -252,6 +252,11 @@ def test_it_is_ready_while_it_is_active(made, vehicle) -> None:
     answers_as(made, 'gvc', PER_AXIS, STEPS)
 
 
+def test_a_law_that_is_still_to_come_is_said_at_the_start(made, vehicle, capfd) -> None:
+    made.add(ControllerNode, {'vehicle': str(vehicle), **EXACT, 'autostart': False})
+    assert 'begins: tracks cmd_vel with a law in lock-step' in capfd.readouterr().err
+
+
 def test_before_it_is_configured_it_hears_and_resets_nothing(made, vehicle) -> None:
     node = controller(made, vehicle, 'gvc', autostart=False)
     for topic in (topics.CMD_VEL, topics.CMD_ACCEL):

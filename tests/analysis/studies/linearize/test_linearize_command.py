@@ -30,15 +30,16 @@ def test_a_vehicle_alone(tmp_path, capsys):
 
 
 @pytest.mark.usefixtures('unrendered')
-def test_the_loops_of_a_scenario_as_a_table(tmp_path, capsys, approved):
-    main(['linearize', 'case1', '--controller', 'cl', '--out', str(tmp_path / 'out')])
-    text = capsys.readouterr().out
-    approved.folder(tmp_path / 'out')
+def test_the_loops_of_a_scenario_as_a_table(tmp_path, monkeypatch, capsys, approved):
+    monkeypatch.chdir(tmp_path)
+    main(['linearize', 'case1', '--controller', 'cl'])
+    text, out = capsys.readouterr().out, tmp_path / 'runs' / 'linearize_case1'
+    approved.folder(out)
     approved.add(text.splitlines())
     for word in ('open loop: 8 states', 'cl: 20 states', 'damping', 'frequency, rad/s', '±'):
         assert word in text
     assert 'gvc' not in text
-    model = json.loads((tmp_path / 'out' / 'linearization.json').read_text())['models']['cl']
+    model = json.loads((out / 'linearization.json').read_text())['models']['cl']
     zeros = sum(mode['pole'] == [0.0, 0.0] for mode in model['modes'])
     assert zeros == 2, 'roll and pitch: their restoring moments are compensated'
     assert (model['stable'], model['stability']) == (False, 'marginal')

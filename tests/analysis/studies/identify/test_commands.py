@@ -21,7 +21,7 @@ from auv_analysis.cli.main import main, parser
 from auv_analysis.output.folder import results_folder
 from auv_analysis.report.results import Results
 from auv_analysis.studies.identify import bags, identify, prediction
-from auv_analysis.studies.identify.bags import read_records
+from auv_analysis.studies.identify.bags import _not_acting, read_records
 from auv_analysis.studies.identify.vehicle_text import write_vehicle
 from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.files.shipped import shipped
@@ -198,6 +198,14 @@ def test_a_recording_that_contradicts_the_prior_gives_no_file(bag, tmp_path, mon
     listed = {row['name']: row['value'] for row in document['parameters']}
     diagonal = [listed[f'M[{i}][{i}]'] for i in range(6)]  # of which some lie below M_RB
     assert np.diag(vehicle.M) == pytest.approx(diagonal, rel=1e-5)
+
+
+def test_what_acted_less_is_told_of_forces_and_moments_apart() -> None:
+    command = np.tile([1000.0, 0.5, 900.0, 0.5, 0.2, 1e-4], (9, 1))
+    acting = np.tile([500.0, 0.0, 900.0, 0.1, 0.2, 0.0], (9, 1))
+    (note,) = _not_acting(command, acting)
+    assert note.startswith('surge and roll: much less acted'), 'what is left is rounding'
+    assert list(_not_acting(command, 0.7 * command)) == [], 'a lag may do it'
 
 
 def test_the_wrench_that_acted_takes_the_place_of_the_command_and_the_truth_that_of_nothing(

@@ -9,7 +9,7 @@ from helpers.made_sweeps import make_sweep
 from auv_analysis.metrics.measures import BY_NAME
 from auv_analysis.studies.sweep.analysis import analysed
 from auv_analysis.studies.sweep.dataset import open_sweep
-from auv_analysis.studies.sweep.indices import designed
+from auv_analysis.studies.sweep.indices import designed, omitted
 from auv_analysis.studies.sweep.indices import indices as indices_of
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.vehicle import DOFS
@@ -159,6 +159,16 @@ def test_a_figure_that_is_the_same_everywhere_has_no_indices(tmp_path: Path, fig
     assert list(indices_of(sweep, found, values, measure)) == []
     values[5] += 1.0
     assert len(list(indices_of(sweep, found, values, measure))) == 3
+
+
+def test_a_figure_that_some_rows_of_one_case_lack_is_said_to_have_no_indices(tmp_path) -> None:
+    text = MORRIS.replace('vary:', 'vary:\n  - grid: {integrator: [ode5, rk4]}')
+    sweep = open_sweep(make_sweep(tmp_path, text, linear))
+    ((found,), _), values = designed(sweep), np.zeros(sweep.rows)
+    assert list(omitted(sweep, found, values, BY_NAME[ENERGY])) == []
+    values[np.flatnonzero(found.others == 0)[:3]] = np.nan
+    (note,) = omitted(sweep, found, values, BY_NAME[ENERGY])
+    assert f': 3 of {sweep.rows} rows have none' in note
 
 
 @pytest.mark.parametrize('count', [7, 8])

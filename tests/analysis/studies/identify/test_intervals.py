@@ -21,8 +21,9 @@ from auv_analysis.studies.identify.identify import (
 from auv_analysis.studies.identify.intervals import far_from_quadratic, profile
 from auv_analysis.studies.identify.output_error import OutputError
 from auv_analysis.studies.identify.record import Record, segments_of
+from auv_analysis.studies.identify.report import results_of, verdict
 from auv_analysis.studies.identify.unknowns import unknowns
-from auv_analysis.studies.identify.whiteness import told, whiteness
+from auv_analysis.studies.identify.whiteness import reservation, told, whiteness
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
 FREE = ('M.diagonal', 'D_linear', 'lag', 'delay')  # few, so that a refit costs little
@@ -107,6 +108,24 @@ def test_residuals_are_not_white_under_a_disturbance(disturbed):
     assert [row['verdict'] for row in rows] == ['slow'] * 6
     assert all(row['slow'] > 0.5 for row in rows)
     assert 'not white in surge' in told(rows)
+    assert (said := reservation(rows))
+    assert said in results_of(found, []).facts['verdict']
+
+
+def test_a_verdict_carries_slow_residuals_that_outweigh_the_noise():
+    row = {'dof': 'sway', 'verdict': 'slow', 'rms': 1.5}
+    louder = {'dof': 'yaw', 'verdict': 'slow', 'rms': 25.3}
+    quiet = [{**row, 'rms': 1.4}, {**louder, 'verdict': 'coloured'}, {**louder, 'verdict': 'white'}]
+    assert reservation(quiet) == reservation([]) == ''
+    reserved = reservation([*quiet, row, louder])
+    assert '25 times the noise in yaw' in reserved
+    assert 'sway' in reservation([*quiet, row])
+    one = {'predictor': 'prior', 'horizon': 2.0, 'ratio': 0.4, 'ratio_low': 0.3, 'ratio_high': 0.5}
+    for rows in ([one], []):
+        assert verdict(rows, [], reserved) == f'{verdict(rows, [])[:-1]}{reserved}.'
+    assert verdict([one], ['it is another vehicle'], reserved) == (
+        'No vehicle file: it is another vehicle.'
+    )
 
 
 def test_residuals_that_alternate_are_coloured_and_not_slow():

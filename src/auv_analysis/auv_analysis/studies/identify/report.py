@@ -15,7 +15,7 @@ from auv_analysis.studies.identify.plausibility import contradictions, excitatio
 from auv_analysis.studies.identify.prediction import by_name
 from auv_analysis.studies.identify.record import Record
 from auv_analysis.studies.identify.record import described as of_record
-from auv_analysis.studies.identify.whiteness import told, whiteness
+from auv_analysis.studies.identify.whiteness import reservation, told, whiteness
 from auv_dynamics.vehicle import DOFS
 
 VEHICLE, NAME = 'vehicle.yaml', 'identify'
@@ -72,7 +72,7 @@ def results_of(found: Identified, notes: Sequence[str], *, accepted: bool = Fals
             'combinations': found.combinations(),
             'contradictions': wrong,
             'excitation': [*excitation(found.training), *too_short(found)],
-            'verdict': verdict(found.predictions, [] if accepted else wrong),
+            'verdict': verdict(found.predictions, [] if accepted else wrong, reservation(white)),
             'file': '' if wrong and not accepted else VEHICLE,
             'notes': list(notes),
             **_listed(rows, found.predictions, tables),
@@ -239,12 +239,15 @@ def verdict_alone(vehicle: str, rows: Sequence[Mapping[str, Any]]) -> str:
     return f'{vehicle} predicts {join(said)}.' if rows else 'Nothing was held out, or too little.'
 
 
-def verdict(rows: Sequence[Mapping[str, Any]], contradicted: Sequence[str]) -> str:
-    """Whether the new model is better than the old, in a sentence."""
+def verdict(
+    rows: Sequence[Mapping[str, Any]], contradicted: Sequence[str], reserved: str = ''
+) -> str:
+    """Whether the new model is better than the old, in a sentence, with what it is reserved by."""
     if contradicted:
         return f'No vehicle file: {contradicted[0]}.'
     if not rows:
-        return 'Nothing was held out, or too little: how good the model is has not been tried.'
+        text = 'Nothing was held out, or too little: how good the model is has not been tried'
+        return f'{text}{reserved}.'
     first = [row for row in by_name(rows, 'prior') if row['horizon'] >= JUDGED] or by_name(
         rows, 'prior'
     )
@@ -265,7 +268,8 @@ def verdict(rows: Sequence[Mapping[str, Any]], contradicted: Sequence[str]) -> s
         name for name in ('persistence', 'black box')
         if any(r['ratio_high'] >= 1.0 for r in by_name(rows, name) if r['horizon'] >= JUDGED)
     ]  # fmt: skip
-    return f'{text}; not clearly better than {join(rivals)}.' if rivals else f'{text}.'
+    beaten = f'; not clearly better than {join(rivals)}' if rivals else ''
+    return f'{text}{beaten}{reserved}.'
 
 
 def sentences(results: Results) -> list[str]:

@@ -15,6 +15,7 @@ SLOW = 1.0  # Hz
 CERTAIN = 0.01  # probability by chance, of all velocities together
 LITTLE = 0.05  # autocorrelation: less is no finding, however certain
 MUCH = 1.5  # times the power of white noise
+LOUD = 2.0  # of the power of the noise: as much beside it
 
 
 def whiteness(pairs: Sequence[tuple[Segment, np.ndarray]], step: float) -> list[dict[str, Any]]:
@@ -90,4 +91,16 @@ def told(rows: Sequence[Mapping[str, Any]], *, current: bool = False) -> str:
         f'{number(100 * worst["slow"], 2)} % of their power lies below {SLOW:g} Hz, of white noise '
         f'{number(100 * worst["slow_if_white"], 2)} %; something slow acts that the model lacks'
         f'{"" if current else ", as a current would (--free current)"}'
+    )
+
+
+def reservation(rows: Sequence[Mapping[str, Any]]) -> str:
+    """What a verdict on the model must say of slow residuals; empty where noise outweighs them."""
+    slow = [row for row in rows if row['verdict'] == 'slow' and row['rms'] ** 2 > LOUD]
+    if not slow:
+        return ''
+    worst = max(slow, key=lambda row: row['rms'])
+    return (
+        f'; but something slow acts that it lacks, {number(worst["rms"], 2)} times the noise in '
+        f'{worst["dof"]}: coefficients may be off by more than their intervals'
     )

@@ -166,6 +166,22 @@ def test_between_two_pauses_close_together_there_is_no_record():
     assert [round(one.end) for one in of_tracks('x', tracks(dict.fromkeys(ROWS, ns)))] == [4, 10]
 
 
+def test_a_jump_of_the_attitude_ends_a_stretch_and_wrong_rates_do_not():
+    ns = np.rint(5e7 * np.arange(201)).astype(np.int64)
+    given, t = tracks(dict.fromkeys(ROWS, ns)), ns / 1e9
+    yaw = 0.3 * np.where(t < 6.01, t, t - 6.05)  # the plant is reset at 6.05 s
+    given['pose'].rows[:, [3, 6]] = np.stack([np.cos(yaw / 2), np.sin(yaw / 2)], axis=1)
+    notes: list[str] = []
+    given['twist'].rows[:, 5] = 0.3
+    found = of_tracks('x', given, notes=notes)
+    assert_allclose([(one.start, one.end) for one in found], [(0.0, 6.0), (6.05, 10.0)])
+    assert notes == ['the attitude jumps at 6.05 s, as by a reset: cut there']
+    given['pose'].rows[:, [3, 6]] = np.stack([np.cos(9 * t), np.sin(9 * t)], axis=1)
+    assert [one.end for one in of_tracks('x', given, notes=notes[:0])] == [10.0]
+    given['twist'].rows[:, 5] = np.nan
+    assert [one.end for one in of_tracks('x', given)] == [10.0]
+
+
 def test_commands_of_recordings_come_to_the_finest_step():
     coarse, fine = record(7.2, 0.06), record(5.0, 0.02)  # of which 7.2 are 359.99999999999994
     found, same = on_one_step([coarse, fine])
@@ -392,6 +408,15 @@ def test_a_start_is_found_from_a_slow_velocity(herman, rate):
     quadratic, true = (np.diag(a.D_quadratic)[:3] for a in (found, vehicle))
     assert_allclose(quadratic, true, rtol=0.2)
     assert late == pytest.approx(LAG + DELAY, abs=0.03)
+
+
+def test_a_command_is_reversed_where_it_accelerates_the_vehicle_and_not_where_drag_takes_it(herman):
+    vehicle = load_vehicle('herman2018')
+    u = unknowns(vehicle, speeds=np.full(6, 0.1), wrenches=np.full(6, 10.0))
+    for drag, said in ((0.0, ['roll']), (3e4, [])):
+        command = herman.command.copy()
+        command[:, 3] = drag * herman.velocity[:-1, 3] - command[:, 3]
+        assert least_squares_start([replace(herman, command=command)], u)[2] == said
 
 
 def test_a_start_counts_lift_and_couplings_of_damping(tmp_path):

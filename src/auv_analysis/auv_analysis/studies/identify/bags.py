@@ -67,7 +67,11 @@ def read_records(
         for note in _not_acting(tracks[WRENCH].rows, tracks[WRENCH_APPLIED].rows):
             say(f'warning: {bag}: {note}')
             notes.append(note)
-    records = of_tracks(bag.name, tracks, role)
+    jumps: list[str] = []
+    records = of_tracks(bag.name, tracks, role, jumps)
+    for note in jumps:
+        say(f'warning: {bag}: {note}')
+    notes += jumps
     if not any(record.known.any() for record in records):
         found = 'a velocity that never changes' if records else 'none'
         raise InputError(bag, '', 'a second and more with attitude, velocity and wrench', found)

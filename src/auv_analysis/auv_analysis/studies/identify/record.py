@@ -1,6 +1,6 @@
 """Measured motion and command of a vehicle, each at its own times, and segments of them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,8 @@ SMOOTHING = 0.4  # s, window of the local polynomials from which states are read
 PAUSE = 0.5  # s without a measurement of something that end no stretch where no gap was told
 SHORTEST = 1.0  # s of a record
 ROUNDED = 1e-12  # m/s, rad/s, rad
+JUMP, SELDOM = 0.1, 0.01  # rad between two samples, and of all samples: more often it is none
+FEW = 3  # jumps whose times are named
 EVEN = 0.5  # of the mean interval: where all lie within, clocks jitter but no sample lacks
 
 
@@ -91,7 +93,9 @@ class Record:
         return np.where(found > ROUNDED, found, np.nan)  # what stands still tells no noise
 
 
-def of_tracks(name: str, tracks: Mapping[str, Track], role: str = WRENCH) -> list[Record]:
+def of_tracks(
+    name: str, tracks: Mapping[str, Track], role: str = WRENCH, notes: list[str] | None = None
+) -> list[Record]:
     """Records of the stretches of a bag that have attitude, velocity and command.
 
     Parameters
@@ -99,6 +103,7 @@ def of_tracks(name: str, tracks: Mapping[str, Track], role: str = WRENCH) -> lis
     name : of the bag
     tracks : role -> signal in NED and FSD, as of `tracks_of`
     role : of the wrench, which was commanded or acted
+    notes : gets where the attitude jumps, which ends a stretch
 
     """
     pose, twist, command = tracks['pose'], tracks['twist'], tracks[role]
@@ -108,8 +113,13 @@ def of_tracks(name: str, tracks: Mapping[str, Track], role: str = WRENCH) -> lis
     signals = [track.tolerant(PAUSE * NANOSECONDS) for track in (pose, twist, command)]
     seconds = [(track.ns - origin) / NANOSECONDS for track in signals]
     span = (max(int(track.ns[0]) for track in signals), min(int(track.ns[-1]) for track in signals))
+    jumps = _jumps(pose, twist)
+    if jumps and notes is not None:
+        times = ', '.join(f'{(after - origin) / NANOSECONDS:.4g}' for _, after in jumps[:FEW])
+        notes.append(f'the attitude jumps at {times} s'
+                     f'{" and later" * (len(jumps) > FEW)}, as by a reset: cut there')  # fmt: skip
     found = []
-    for first, last in between_gaps(*span, signals):
+    for first, last in _apart(between_gaps(*span, signals), jumps):
         begin, end = ((ns - origin) / NANOSECONDS for ns in (first, last))
         ns = origin + np.round(np.arange(begin, end + step / 2, step) * NANOSECONDS).astype(
             np.int64
@@ -123,6 +133,31 @@ def of_tracks(name: str, tracks: Mapping[str, Track], role: str = WRENCH) -> lis
             )
         )  # fmt: skip
     return long_enough(found)
+
+
+def _jumps(pose: Track, twist: Track) -> list[tuple[int, int]]:
+    """Stamps, ns, between which the attitude turns by far more than the angular velocity tells."""
+    rates = [np.interp(pose.ns, twist.ns[there], twist.rows[there, i]) for i in (3, 4, 5)
+             if (there := np.isfinite(twist.rows[:, i])).any()]  # fmt: skip
+    if len(rates) < 3 or len(pose.ns) < 2:
+        return []
+    speed = np.linalg.norm(rates, axis=0)
+    told = np.maximum(speed[1:], speed[:-1]) * np.diff(pose.ns) / NANOSECONDS
+    turned = np.linalg.norm(small_rotation(pose.rows[:-1, 3:], pose.rows[1:, 3:]), axis=1)
+    where = np.flatnonzero(turned > JUMP + 2.0 * told)
+    if len(where) > SELDOM * len(pose.ns):
+        return []  # it is the angular velocity that is wrong
+    return [(int(pose.ns[k]), int(pose.ns[k + 1])) for k in where]
+
+
+def _apart(
+    spans: Iterable[tuple[int, int]], jumps: Sequence[tuple[int, int]]
+) -> Iterator[tuple[int, int]]:
+    """Spans of time, ns, without the times of jumps."""
+    for first, last in spans:
+        inside = [jump for jump in jumps if first <= jump[0] and jump[1] <= last]
+        edges = [first, *(ns for jump in inside for ns in jump), last]
+        yield from zip(edges[::2], edges[1::2], strict=True)
 
 
 def long_enough(records: Sequence[Record]) -> list[Record]:

@@ -28,6 +28,7 @@ PLACES: list[tuple[str, tuple[int, ...]]] = [  # of the 37 regressors
 MOST = 8000  # samples that are used
 REWEIGHTED = 4
 REVERSED = 0.3  # of the prior's inertia: what comes out more negative is no noise
+INERTIAL = 0.1  # of the command, by the prior: where inertia takes less, its sign is no finding
 FLOOR = 0.02  # of the largest eigenvalue of the scaled M: below it, a direction is not believed
 
 
@@ -61,7 +62,9 @@ def least_squares_start(
 
 def _reversed(found: dict[str, np.ndarray], M: np.ndarray) -> list[str]:
     """Degrees of freedom in which the command pushes against the acceleration that it makes."""
-    wrong = (np.diag(found['raw']) < -REVERSED * np.diag(M)) & (found['explained'] > 0.5)
+    prior = np.diag(M)
+    wrong = (np.diag(found['raw']) < -REVERSED * prior) & (found['explained'] > 0.5)
+    wrong &= prior * found['accelerated'] > INERTIAL * found['commanded']
     return [DOFS[i] for i in np.flatnonzero(wrong)]
 
 
@@ -118,6 +121,7 @@ class _Normal:
         Y = np.concatenate([row[2] for row in rows])
         self.prior, self.free = prior, free
         self.rows = [row[:2] for row in rows]
+        self.accelerated = np.array([Y[:, i, LOWER.index((i, i))].std() for i in range(6)])
         self.fixed = Y[:, :, ~free] @ self.known[~free]
         nu = np.concatenate([row[3] for row in rows])
         for A, x in ((prior.D_linear, nu), (prior.D_quadratic, nu * np.abs(nu))):
@@ -146,6 +150,8 @@ class _Normal:
             M[i, j] = M[j, i] = value
         return float(np.log(deviation).sum()), {
             'raw': M,
+            'accelerated': self.accelerated,
+            'commanded': U.std(axis=0),
             'explained': 1.0 - deviation**2 / np.maximum(rest.var(axis=1), 1e-300),
             'M': _definite(M, self.prior.M),
             'D_linear': _with_diagonal(self.prior.D_linear, known[21:27]),

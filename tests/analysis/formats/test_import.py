@@ -452,6 +452,12 @@ def test_a_model_of_classic_gazebo_has_its_body_in_sdf(imported):
     S = skew(found.r_G)
     about_cg = found.M_RB[3:, 3:] + found.M_RB[0, 0] * S @ S
     assert_allclose(about_cg, swap_inertia(quarter @ given @ quarter.T), atol=1e-9)
+    for rpy in (f'0 0 {np.pi / 2}', '0.3 -0.2 0.5'):  # of URDF; the same angles turn both
+        turned = text.replace('0.1 0.2 0.3 0 0 0', f'0.1 0.2 0.3 {rpy}')
+        found, _ = imported('turned.sdf', f'<sdf version="1.6">{turned}</sdf>')
+        of_urdf, document = imported('b.urdf', moved.replace('xyz', f'rpy="{rpy}" xyz', 1))
+        assert_allclose(of_urdf.M, found.M, rtol=1e-12, atol=1e-9)
+        assert any('the tensor is turned' in text for text in document['traps'])
     assert_allclose(found.r_G, vehicle.r_G)
     assert any('the tensor is turned' in text for text in document['traps'])
 
@@ -507,7 +513,8 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
     'not finite': ('a.sdf', sdf().replace('-18', 'nan'), [], 'xUabsU'),
     'xacro in an angle': (
         'a.urdf', URDF.replace('xyz="0 0 0"', 'rpy="0 0 ${pi}"'), [], 'expand xacro first'),
-    'an angle': ('a.urdf', URDF.replace('xyz="0 0 0"', 'rpy="0 0 1"'), [], 'rpy="0 0 0"'),
+    'two angles': (
+        'a.urdf', URDF.replace('xyz="0 0 0"', 'rpy="0 1"'), [], 'origin.rpy: expected 3'),
     'a frame of another model': ('a.sdf', sdf().replace(
         '<pose>0 0 0.05', '<pose relative_to="other::mount">0 0 0.05'), [], 'other::mount'),
     'frames in a circle': ('a.sdf', sdf(more='</plugin><frame name="a" attached_to="b"/>'

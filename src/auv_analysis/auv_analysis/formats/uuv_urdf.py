@@ -23,6 +23,7 @@ from auv_analysis.formats.xml_parts import (
     put_rigid_body,
 )
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle.kinematics import quaternion, rotation
 
 ALIASES = {
     'Ma': 'added_mass', 'quad_damping': 'quadratic_damping', 'cog': 'center_of_gravity',
@@ -195,15 +196,19 @@ def _inertial(link: Element, model: Element, path: Path) -> tuple[dict[str, Any]
     found = link.find('inertial')
     assert found is not None
     origin, inertia = found.find('origin'), found.find('inertia')
-    if origin is not None and any(numbers(origin.get('rpy', '0 0 0'), 3, path, 'inertial.origin')):
-        raise InputError(path, 'inertial.origin', 'rpy="0 0 0"', origin.get('rpy'))
     point, R = pose_in_link(found, link, model, path, 'inertial')  # of SDF
+    if origin is not None:
+        xyz, rpy = (
+            np.array(numbers(origin.get(name, '0 0 0'), 3, path, f'inertial.origin.{name}'))
+            for name in ('xyz', 'rpy')
+        )
+        point, R = xyz, rotation(quaternion(rpy))
     parts = {} if inertia is None else {str(part.tag): part.text or '' for part in inertia}
     texts = parts if inertia is None else parts | dict(inertia.attrib)
     tensor = dict(zip(ENTRIES, inertia_entries(texts, R, path, 'inertial'), strict=True))
     body = {
         'mass': mass_of(found),
-        'center_of_gravity': point.tolist() if origin is None else origin.get('xyz', '0 0 0'),
+        'center_of_gravity': point.tolist(),
         'inertial': tensor,
     }
     return body, [TURNED] * bool(np.any(np.eye(3) != R))

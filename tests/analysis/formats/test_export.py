@@ -46,18 +46,21 @@ def test_lift_that_feeds_its_own_motion_comes_back(place, tmp_path, monkeypatch,
     assert_allclose(load_vehicle(tmp_path / 'back.yaml').lift, data['lift'])
 
 
-def test_quadratic_damping_that_feeds_its_motion_comes_back(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize('place', ['plugin', 'link'])
+def test_quadratic_damping_that_feeds_its_motion_comes_back(place, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     text = shipped('vehicles', 'bluerov2_heavy').read_text()
     Path('mine.yaml').write_text(text.replace('0.47, 1.5]', '0.47, -0.3]'))
-    main(['export-vehicle', 'mine.yaml', '--format', 'gazebo', '--out', 'm.sdf'])
+    line = 'export-vehicle mine.yaml --format gazebo --out m.sdf --added-mass'
+    main([*line.split(), place])
     with pytest.raises(SystemExit):
         main(['import-vehicle', 'm.sdf', '--out', 'again.yaml'])
     assert 'or --sign sname if this one feeds its motion' in capsys.readouterr().err
     main(['import-vehicle', 'm.sdf', '--sign', 'sname', '--out', 'again.yaml'])
-    known = load_vehicle('mine.yaml').D_quadratic
-    assert known[5, 5] < 0
-    assert_allclose(load_vehicle('again.yaml').D_quadratic, known)
+    known, again = load_vehicle('mine.yaml'), load_vehicle('again.yaml')
+    assert known.D_quadratic[5, 5] < 0
+    assert_allclose(again.D_quadratic, known.D_quadratic)
+    assert_allclose(again.M_A, known.M_A)
 
 
 def test_damping_acts_in_gazebo_as_here(tmp_path, capsys):

@@ -137,7 +137,8 @@ def _coefficients(draft: ImportedVehicle, plugin: Element, link: Element) -> Non
         elif value:
             _quadratic(draft, quadratic, tag, (i, j, match[5], bool(match[4])), value)
     M_A, convention, said = _added_mass(draft, plugin, link, added)
-    M_A = draft.positive('added_mass', M_A, convention, said)
+    if convention == SNAME:  # the sign that is told is the plugin's
+        M_A = draft.positive('added_mass', M_A, convention, said)
     draft.put('added_mass', draft.from_flu('added_mass', M_A), said)
     for key, A, said in (('linear', linear, 'xU ... nR'), ('quadratic', quadratic, 'xUabsU ...')):
         name = f'damping.{key}'
@@ -186,6 +187,5 @@ def _added_mass(
             raise draft.refuse(f'fluid_added_mass.{tag}', 'xx, xy ... rr', tag)
         i, j = (FLUID.index(letter) for letter in tag)
         M_A[i, j] = M_A[j, i] = numbers(child.text, 1, draft.file, f'fluid_added_mass.{tag}')[0]
-    if draft.choices.sign is None:
-        draft.traps.append('fluid_added_mass: positive there, unlike xDotU ...: taken as it is')
+    draft.traps.append('fluid_added_mass: positive there, unlike xDotU ...: taken as it is')
     return M_A, POSITIVE, '<fluid_added_mass> of the link'

@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
 from auv_analysis.bag.tracks import Track
+from auv_analysis.studies.identify import plausibility
 from auv_analysis.studies.identify.couplings import couplings
 from auv_analysis.studies.identify.identified import Identified
 from auv_analysis.studies.identify.identify import (
@@ -30,6 +31,7 @@ from auv_analysis.studies.identify.plausibility import (
     check_rates,
     contradictions,
     excitation,
+    too_coarse,
 )
 from auv_analysis.studies.identify.prediction import held_of
 from auv_analysis.studies.identify.record import Record, of_tracks, segments_of
@@ -134,6 +136,18 @@ def test_a_wrong_reading_is_told(herman, wrong, said, approved):
     assert said in contradictions(result)[0]
     approved.within = 0.02
     approved.add(contradictions(result))
+
+
+@pytest.mark.parametrize(('step', 'told'), [(0.05, False), (1.0, True)])
+def test_commands_that_come_too_seldom_for_the_damping_are_told(herman, step, told, monkeypatch):
+    for name in ('_scale', '_mirrored'):
+        monkeypatch.setattr(plausibility, name, lambda found: [])
+    worse = {'predictor': 'persistence', 'horizon': 1.0, 'ratio_low': 1.5}
+    found = SimpleNamespace(vehicle=load_vehicle('lauv'), training=[herman[0]],
+                            problem=SimpleNamespace(step=step), predictions=[worse])  # fmt: skip
+    assert [f'every {step:.1f} s' in text for text in too_coarse(found)] == [True] * told
+    (reason,) = contradictions(found)
+    assert ('record them more often' in reason, 'another vehicle' in reason) == (told, not told)
 
 
 @pytest.mark.parametrize(('share', 'told'), [(0.4, True), (0.6, False)])

@@ -72,6 +72,18 @@ def too_short(found: Identified) -> list[str]:
             'commands before it']  # fmt: skip
 
 
+def too_coarse(found: Identified) -> list[str]:
+    """Whether damping acts faster than commands come, in a sentence."""
+    nu = np.concatenate([np.nan_to_num(record.velocity) for record in found.training])
+    D = found.vehicle.D(np.sqrt((nu**2).mean(axis=0)))
+    time = 1.0 / max(np.abs(np.linalg.eigvals(np.linalg.solve(found.vehicle.M, D))).max(), 1e-9)
+    step = found.problem.step
+    if step < time:
+        return []
+    return [f'commands come every {number(step, 2)} s, and by the vehicle file damping stops a '
+            f'motion within {number(time, 2)} s: record them more often']  # fmt: skip
+
+
 def _in_one_line(signal: np.ndarray) -> float:
     """Share of the power of (n, 6) around the strongest frequency; 0 of too few periods of it."""
     total = (np.abs(np.fft.rfft(signal - signal.mean(axis=0), axis=0)) ** 2).sum(axis=1)
@@ -81,7 +93,9 @@ def _in_one_line(signal: np.ndarray) -> float:
 
 def contradictions(found: Identified) -> list[str]:
     """Why the result is no model of this vehicle, a sentence each; none: nothing contradicts."""
-    return [*_scale(found), *_mirrored(found), *_useless(found)]
+    useless = _useless(found)
+    coarse = too_coarse(found) if useless else []  # then it is nothing else
+    return [*_scale(found), *_mirrored(found), *(coarse or useless)]
 
 
 def _scale(found: Identified) -> list[str]:

@@ -11,7 +11,12 @@ from auv_analysis.report.document import Block, Section, Sentence, write_documen
 from auv_analysis.report.results import Column, Results, Shown, described, terminal
 from auv_analysis.studies.identify.couplings import couplings
 from auv_analysis.studies.identify.identified import Identified
-from auv_analysis.studies.identify.plausibility import contradictions, excitation, too_short
+from auv_analysis.studies.identify.plausibility import (
+    contradictions,
+    excitation,
+    too_coarse,
+    too_short,
+)
 from auv_analysis.studies.identify.prediction import by_name
 from auv_analysis.studies.identify.record import Record
 from auv_analysis.studies.identify.record import described as of_record
@@ -71,7 +76,11 @@ def results_of(found: Identified, notes: Sequence[str], *, accepted: bool = Fals
             'hardly_moving': [entry.name for entry in found.still],
             'combinations': found.combinations(),
             'contradictions': wrong,
-            'excitation': [*excitation(found.training), *too_short(found)],
+            'excitation': [
+                *excitation(found.training),
+                *too_short(found),
+                *([] if wrong else too_coarse(found)),
+            ],
             'verdict': verdict(found.predictions, [] if accepted else wrong, reservation(white)),
             'file': '' if wrong and not accepted else VEHICLE,
             'notes': list(notes),

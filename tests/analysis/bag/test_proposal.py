@@ -197,6 +197,8 @@ def test_of_topics_that_come_as_often_the_one_that_is_called_so_is_likeliest() -
     contents = BagContents(types=dict.fromkeys(names, 'geometry_msgs/msg/WrenchStamped'))
     contents.counts = dict.fromkeys(names, 401)
     assert candidates(contents)['wrench'] == ['/wrench', '/wrench_applied', '/disturbance']
+    contents.counts['/disturbance'] += 1
+    assert candidates(contents)['wrench'] == ['/disturbance', '/wrench', '/wrench_applied']
 
 
 @pytest.mark.parametrize(('kinds', 'options'), [

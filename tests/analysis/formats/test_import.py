@@ -514,7 +514,10 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
     'xacro in an angle': (
         'a.urdf', URDF.replace('xyz="0 0 0"', 'rpy="0 0 ${pi}"'), [], 'expand xacro first'),
     'two angles': (
-        'a.urdf', URDF.replace('xyz="0 0 0"', 'rpy="0 1"'), [], 'origin.rpy: expected 3'),
+        'a.urdf', URDF.replace('xyz="0 0 0"', 'rpy="0 1"'), [],
+        'a.urdf: inertial.origin.rpy: expected 3'),
+    'a word for an inertia': (
+        'a.urdf', URDF.replace('"525.39"', '"much"'), [], 'a.urdf: inertial.ixx: expected'),
     'a frame of another model': ('a.sdf', sdf().replace(
         '<pose>0 0 0.05', '<pose relative_to="other::mount">0 0 0.05'), [], 'other::mount'),
     'frames in a circle': ('a.sdf', sdf(more='</plugin><frame name="a" attached_to="b"/>'

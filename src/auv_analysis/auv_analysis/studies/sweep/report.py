@@ -180,14 +180,15 @@ def write_report(out: Path, analysis: Analysis, figures: Mapping[str, FigureReco
     sweep, tables = analysis.sweep, analysis.tables
     depends = [figure for name, figure in figures.items() if name.startswith('dependence_')]
 
-    rows, caption = analysis.counts(), 'Rows of each controller.'
-    counts = _of_document('counts', 'controllers', caption, rows, shown=COUNTS)
-
     def shown(*names: str) -> list[Block]:
         return [figures[name] for name in names if name in figures]
 
     sections = [
-        Section('campaign', 'What was swept', [_paths(analysis), counts, *analysis.notes]),
+        Section('campaign', 'What was swept', [
+            _paths(analysis),
+            _of_document('counts', 'controllers', 'Rows of each controller.', analysis.counts(),
+                         shown=COUNTS),
+            *analysis.notes]),
         Section('distributions', 'Distributions', [
             *shown('distributions'), *([_spreads(analysis)] if analysis.measures else [])]),
         Section('controllers', 'Controllers against each other',

@@ -39,21 +39,20 @@ def parameters_of(contents: BagContents, bag: Path) -> Parameters:
     """
     found = _written(contents, bag)
     if contents.laws:
-        controller = found.get(contents.controller, found.get(CONTROLLER, {}))
-        found[CONTROLLER] = _in_charge(controller, contents)
+        found[CONTROLLER] = _in_charge(found.get(CONTROLLER, {}), contents)
     return found
 
 
 def settings_in_turn(contents: BagContents, bag: Path) -> list[tuple[int, dict[str, Any]]]:
     """Parameters of the controller with the settings that it says, as `BagContents.laws`."""
-    found = _written(contents, bag)
-    controller = found.get(contents.controller, found.get(CONTROLLER, {}))
+    controller = _written(contents, bag).get(CONTROLLER, {})
     return [
         (ns, {**controller, **(_mapping(changed) or {})}) for (*_, changed), ns in contents.laws
     ]
 
 
 def _written(contents: BagContents, bag: Path) -> Parameters:
+    """Parameters of params.yaml, the controller's under its usual name."""
     text = contents.attachments.get('params.yaml', '{}')
     file = f'{bag}: params.yaml'
     found: Parameters = {}
@@ -63,6 +62,8 @@ def _written(contents: BagContents, bag: Path) -> Parameters:
         rank = OWN if space == own else int(not space or '*' in space)
         if rank >= ranks.get(node, OWN if contents.is_of_another else 0):
             found[node], ranks[node] = values, rank
+    if contents.controller in found:
+        found[CONTROLLER] = found[contents.controller]
     return found
 
 

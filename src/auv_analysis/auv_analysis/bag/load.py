@@ -100,12 +100,10 @@ def open_bag(
     # where the bag does not say it: a controller beside a driver held its set-points
     free = contents.strict is False or (contents.strict is None and _have_own_stamps(series))
     if held := controller.get('setpoint_pairing', LATEST if free else None) == LATEST:
-        timeout = controller.get('setpoint_timeout')
-        if controller.get('lockstep') is True:
-            timeout = math.inf
-        else:
+        timeout, lockstep = controller.get('setpoint_timeout'), controller.get('lockstep') is True
+        if not lockstep:
             series = obeyed(series, whole)
-        if not isinstance(timeout, int | float):
+        if lockstep or not isinstance(timeout, int | float):
             timeout = math.inf
         series, aged = held_series(series, whole, timeout)
         begun += aged

@@ -1,4 +1,4 @@
-"""The messages of any bag or log, decoded: by our own readers, or by the rosbags library."""
+"""Decoded messages of any bag or log, read by our own readers or by the rosbags library."""
 
 import math
 import shutil

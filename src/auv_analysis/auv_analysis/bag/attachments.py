@@ -1,4 +1,4 @@
-"""What the attachments of a bag say of its run: parameters, law, vehicle, scenario."""
+"""Attachments of a bag: parameters, law, vehicle and scenario of its run."""
 
 import json
 import math

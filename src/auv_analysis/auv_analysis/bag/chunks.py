@@ -1,4 +1,4 @@
-"""What lies in a chunk: tables of messages, found in bulk, and the definitions between them."""
+"""Chunks of an MCAP file: their messages as tables, found in bulk, and the definitions between."""
 
 import struct
 from array import array

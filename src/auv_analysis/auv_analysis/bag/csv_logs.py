@@ -1,4 +1,4 @@
-"""CSV files with named columns as messages of topics: a file is a topic, a line a message."""
+"""CSV logs as messages: a file with named columns is a topic, a line a message."""
 
 import contextlib
 import csv

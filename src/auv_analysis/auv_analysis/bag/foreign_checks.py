@@ -1,4 +1,4 @@
-"""What a recording contradicts itself in: axes, rates, delays, a wrench that is not there."""
+"""Contradictions within a recording: axes, rates, delays, a wrench that is not there."""
 
 from collections.abc import Callable, Mapping
 from functools import cache

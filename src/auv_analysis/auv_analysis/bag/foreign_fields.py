@@ -1,4 +1,4 @@
-"""Which numbers of a message are meant: components of a role, paths to them, and their units.
+"""Fields of a message: the components that a role needs, the paths to them, and their units.
 
 A standard message type is a preset of paths; a mapping may name the paths of any other.
 """

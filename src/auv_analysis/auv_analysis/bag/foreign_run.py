@@ -1,4 +1,4 @@
-"""What the model does not explain: F of (1) from measured motion and wrench, with its error.
+"""The unexplained wrench: F of (1) from measured motion and wrench, with its error.
 
 From (1), F is the rate of the impulse less the momentum,
 

@@ -1,4 +1,4 @@
-"""Topics of other systems: a mapping to what they hold, and which ones a bag offers for it."""
+"""Topics of other systems: the mapping to their roles, and the candidates in a bag."""
 
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""How much a bag may make us hold: sizes and counts are checked before anything is made of them."""
+"""Memory limits for untrusted bags: sizes and counts are checked before anything is allocated."""
 
 import zlib
 from contextlib import suppress

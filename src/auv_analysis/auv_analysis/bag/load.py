@@ -1,4 +1,4 @@
-"""A recorded run: the steps that are complete on all topics, in memory or in mapped files."""
+"""Loading a recorded run: the steps complete on all topics, in memory or in mapped files."""
 
 import math
 from collections.abc import Iterator, Mapping

@@ -1,4 +1,4 @@
-"""What a log of ArduSub holds, in the words of a mapping file."""
+"""Mappings of ArduSub's logs, in the words of a mapping file."""
 
 import re
 from collections.abc import Mapping

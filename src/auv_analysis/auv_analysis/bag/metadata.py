@@ -1,4 +1,4 @@
-"""The files of a bag, and what its metadata.yaml and recording.yaml say of it."""
+"""The files of a bag, and the contents of its metadata.yaml and recording.yaml."""
 
 import os
 from collections.abc import Collection, Iterable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What of a run of our plant a recording has: its beginning, its end, and one start."""
+"""The extent of a run of our plant in a recording: its beginning, its end, and one start."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""A file written anew from what could be kept of it: complete indices, summary, statistics."""
+"""Repair of a bag: a file written anew from what was kept, with indices, summary and statistics."""
 
 import contextlib
 import errno

@@ -1,4 +1,4 @@
-"""`auv check-vehicle`: what a vehicle file says about how it can be controlled."""
+"""`auv check-vehicle`: how well the vehicle of a file can be controlled."""
 
 import argparse
 from typing import Any

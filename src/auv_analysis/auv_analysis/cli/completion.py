@@ -1,4 +1,4 @@
-"""What the TAB key offers: commands, options, shipped names, controllers; it must not be slow."""
+"""Completion for the TAB key: commands, options, shipped names, controllers; it must be fast."""
 
 import argparse
 from collections.abc import Callable, Iterable

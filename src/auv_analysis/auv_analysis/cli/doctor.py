@@ -1,4 +1,4 @@
-"""`auv doctor`: looks at the set-up and says what is wrong with it, and what to do."""
+"""`auv doctor`: problems of the set-up, and their remedies."""
 
 import argparse
 from collections import Counter

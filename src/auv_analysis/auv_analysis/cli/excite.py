@@ -1,4 +1,4 @@
-"""`auv excite`: what to drive so that a model can be identified, with the intervals to expect."""
+"""`auv excite`: an excitation for identification, with the confidence intervals to expect."""
 
 from __future__ import annotations
 

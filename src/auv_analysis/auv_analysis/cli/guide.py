@@ -1,4 +1,4 @@
-"""What `auv` says without a command: where one is, and what could come next."""
+"""`auv` without a command: where the user is, and the next steps."""
 
 import re
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""`auv info`: what lies in a bag."""
+"""`auv info`: the contents of a bag."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What commands on scenarios and runs share: scenario and folder, runs, summary and report."""
+"""Shared by commands on scenarios and runs: scenario and folder, runs, summary and report."""
 
 import argparse
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What a check of a driver leaves: the report, its figures, and what was heard and sent."""
+"""The report of a check of a driver: page, figures, and the log of what was heard and sent."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial

@@ -1,4 +1,4 @@
-"""A vehicle on its way into a file of ours: its numbers, where each came from, what was decided."""
+"""An imported vehicle: its numbers, the source of each, and the decisions that were taken."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""Which ROS domain a command joins, and that no other run is on it."""
+"""The ROS domain of a command: which one it joins, and that no other run is on it."""
 
 import fcntl
 import os

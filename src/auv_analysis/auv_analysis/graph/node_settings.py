@@ -1,4 +1,4 @@
-"""Settings of the nodes that look on: analysis and recorder."""
+"""Settings of the analysis node and the recorder."""
 
 from dataclasses import dataclass
 

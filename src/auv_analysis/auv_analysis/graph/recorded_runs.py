@@ -1,4 +1,4 @@
-"""Runs of a scenario's controllers on a domain of their own, read back from their bags."""
+"""Recorded runs of a scenario's controllers on a domain of their own, read back from their bags."""
 
 import os
 import time

@@ -1,4 +1,4 @@
-"""What Herman 2018 prints, as data: gains, numbers and which figure shows what."""
+"""Herman 2018 as data: its gains, its numbers, and what each figure shows."""
 
 from collections.abc import Mapping
 from typing import TypeVar

@@ -1,4 +1,4 @@
-"""How the velocity errors follow the set-points of the other degrees of freedom."""
+"""Cross-coupling of the velocity errors: their response to set-points of other DOF."""
 
 import numpy as np
 

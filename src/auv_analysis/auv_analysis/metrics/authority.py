@@ -1,4 +1,4 @@
-"""What is commanded, held against the weight of a vehicle and what its thrusters can give."""
+"""Control authority: commanded wrench against the vehicle's weight and its thrusters' limits."""
 
 from collections.abc import Iterator, Sequence
 

@@ -1,4 +1,4 @@
-"""Sums and largest magnitudes as `moments` has them, by the compiler: samples in lanes."""
+"""The sums and largest magnitudes of `moments`, compiled: samples in lanes."""
 
 import numpy as np
 

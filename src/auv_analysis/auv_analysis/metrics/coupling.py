@@ -1,4 +1,4 @@
-"""How much each degree of freedom is deformed by the others, equations (31) to (34)."""
+"""Inertial couplings: deformation of each degree of freedom by the others, (31) to (34)."""
 
 from typing import Any
 

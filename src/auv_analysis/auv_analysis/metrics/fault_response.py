@@ -1,4 +1,4 @@
-"""What the faults of a run do to it: errors and effort before, during and after each."""
+"""Response to faults: errors and effort before, during and after each."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""The Lyapunov certificate as figures of a run: whether it applies, and what it says."""
+"""The Lyapunov certificate as metrics of a run: whether it applies, and its values."""
 
 from collections.abc import Collection
 from typing import Any

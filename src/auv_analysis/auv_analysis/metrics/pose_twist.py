@@ -1,4 +1,4 @@
-"""Pose against twist: which reading of the two makes the velocity the rate of the pose.
+"""Pose against twist: the conventions under which the velocity is the rate of the pose.
 
 A reading gives a path and the velocity that would be its rate. The right one is named `CHILD`: the
 pose from body to earth, the twist in body axes. The others are the usual mistakes. Path and

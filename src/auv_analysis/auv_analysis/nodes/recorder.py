@@ -1,4 +1,4 @@
-"""The recorder's parameters, clock and topics: what it records, and when a message came."""
+"""Parts of the recorder: parameters, clock, choice of topics, time of arrival."""
 
 import re
 import shutil

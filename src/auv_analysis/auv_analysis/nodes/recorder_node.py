@@ -1,4 +1,4 @@
-"""Which steps and publications have arrived: nothing lost, nothing doubled."""
+"""The recorder as a node: raw messages into a bag, every step checked, progress published."""
 
 import time
 from collections.abc import Callable, Sequence

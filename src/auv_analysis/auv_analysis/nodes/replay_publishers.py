@@ -1,4 +1,4 @@
-"""What a replay publishes: publishers, the guard of commands, and flow control.
+"""Output of a replay: publishers, the guard of commands, and flow control.
 
 Flow control goes by acknowledgement and by the answers to odometry.
 """

@@ -1,4 +1,4 @@
-"""The terminal: how far work is, text that is safe to print, a share as a bar."""
+"""Terminal output: progress of long work, text that is safe to print, a share as a bar."""
 
 import sys
 from collections.abc import Iterable, Iterator

@@ -1,4 +1,4 @@
-"""What a law would have commanded beside what was commanded: metrics, and a plot."""
+"""A law's wrench on recorded odometry against the recorded one: metrics, and a plot."""
 
 from __future__ import annotations
 

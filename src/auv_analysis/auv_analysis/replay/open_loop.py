@@ -1,4 +1,4 @@
-"""A law on recorded odometry: what it would have commanded, had it been asked.
+"""A law on recorded odometry, open loop: the wrench that it would have commanded.
 
 The loop is open: the vehicle moved as the recorded wrench made it move, whatever this law says.
 Messages go through the very controller that the node runs, in the order in which a node needs them.

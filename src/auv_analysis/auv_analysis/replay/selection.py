@@ -1,4 +1,4 @@
-"""What of a bag is replayed and how, as the ROS parameters ask for it."""
+"""Selection of what is replayed of a bag, and how, by ROS parameters."""
 
 import re
 from collections.abc import Callable, Iterable, Sequence

@@ -1,4 +1,4 @@
-"""Run digest: what plots and tables need of a run, taken in one pass over its blocks."""
+"""Run digest: the data for plots and tables of a run, taken in one pass over its blocks."""
 
 import hashlib
 from collections.abc import Mapping, Sequence

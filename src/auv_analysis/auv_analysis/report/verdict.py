@@ -1,4 +1,4 @@
-"""Which of several controllers tracks better, by how much, with which gains and at which effort."""
+"""Comparison of controllers: which tracks better, by how much, with which gains and effort."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

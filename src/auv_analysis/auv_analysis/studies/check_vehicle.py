@@ -1,4 +1,4 @@
-"""What a vehicle file says: inertia, couplings, hydrostatics, poles, thrusters, largest step."""
+"""Check of a vehicle: inertia, couplings, hydrostatics, poles, thrusters, largest step."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path

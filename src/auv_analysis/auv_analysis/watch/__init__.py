@@ -1,1 +1,1 @@
-"""A live look at a node graph, without ROS: what was heard, what it says, how it is shown."""
+"""Live view of a node graph, without ROS: messages heard, state, problems, screen."""

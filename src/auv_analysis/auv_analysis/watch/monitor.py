@@ -1,4 +1,4 @@
-"""What is known of a live graph: how its messages come in, its motion, what is wrong with it."""
+"""State of a live graph: rates and gaps of its topics, its motion, its problems."""
 
 import math
 from bisect import bisect_right

@@ -1,4 +1,4 @@
-"""What is known of a graph at one moment, as plain numbers: the screen shows it, --json prints it.
+"""Snapshot of a live graph as plain numbers: the screen shows it, --json prints it.
 
 Six numbers stand in the order of the degrees of freedom; what is not known is None.
 """

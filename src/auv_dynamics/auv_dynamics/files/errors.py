@@ -1,4 +1,4 @@
-"""What ends a program in good order: wrong input as one line, work that failed, signals."""
+"""Errors and exits: wrong input as one line, work that failed, signals."""
 
 import re
 import reprlib

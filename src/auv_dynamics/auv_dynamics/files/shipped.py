@@ -1,4 +1,4 @@
-"""Where the shipped vehicles and scenarios are: checkout, colcon install tree or wheel."""
+"""Places of the shipped vehicles and scenarios: checkout, colcon install tree or wheel."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""What is compiled, and the rules for whoever writes in it.
+"""The compiled kernel, and the rules for whoever writes in it.
 
 The terms of the equation of motion, the laws, devices and metrics are written once, as plain Python
 on numbers, tuples of six and arrays. Numba compiles that source twice: for one vehicle, whose

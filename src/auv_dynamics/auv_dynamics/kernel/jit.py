@@ -1,4 +1,4 @@
-"""Numba's side of the kernel: what is inlined, whose code is kept where, and blocks of a batch.
+"""Numba's side of the kernel: inlining, the cache of compiled code, and blocks of a batch.
 
 Imported by `compile.load` alone, when something is first compiled or loaded.
 """

@@ -1,4 +1,4 @@
-"""How the plant differs from the vehicle file: model error, current, external disturbance, (3)."""
+"""Uncertainty of the plant: model error, current, external disturbance, (3)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

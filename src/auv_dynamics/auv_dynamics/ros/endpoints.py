@@ -1,4 +1,4 @@
-"""Who publishes and subscribes a topic, as the middleware's discovery tells it."""
+"""Publishers and subscribers of a topic, by the middleware's discovery."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What every node has in common: publishers, subscriptions, start barrier, diagnostics."""
+"""Common parts of all nodes: publishers, subscriptions, start barrier, diagnostics."""
 
 import math
 import re

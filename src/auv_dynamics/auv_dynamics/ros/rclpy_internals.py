@@ -1,4 +1,4 @@
-"""The private names of rclpy that lock-step relies on: these and no others, and only here.
+"""The private names of rclpy that lock-step relies on; no other module uses any.
 
 The data path of lock-step takes messages past the executor; topics whose types are not installed
 are subscribed by name alone. Without these names everything else works.

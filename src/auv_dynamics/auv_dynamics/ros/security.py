@@ -1,4 +1,4 @@
-"""What a process is open to: its discovery range, and DDS security as the user asked for it.
+"""Exposure of a process: its discovery range, and DDS security as the user asked for it.
 
 ROS reads its security variables letter by letter: `ROS_SECURITY_ENABLE=1` is a no, and every
 strategy but `Enforce` lets a node without keys talk in the clear. Both would pass unnoticed.

@@ -1,4 +1,4 @@
-"""From our frames (NED, forward-starboard-down) to those of ROS (ENU, forward-left-up) and back.
+"""Frames: ours (NED, forward-starboard-down) to those of ROS (ENU, forward-left-up) and back.
 
 Two frames change at once. The earth frame goes from (north, east, down) to (east, north, up), a
 half turn E about the horizontal north-east diagonal; the body frame from forward-starboard-down

@@ -1,4 +1,4 @@
-"""Thrusters of a vehicle: T of tau = T u, its inverse, and which wrenches they let through.
+"""Thrusters of a vehicle: T of tau = T u, its inverse, and the attainable wrench set.
 
 The numbers of a vehicle file become T, (6, n), whose column i is the wrench of one newton of
 thruster i: (e_i, r_i x e_i), Fossen 2021, section 11.2.

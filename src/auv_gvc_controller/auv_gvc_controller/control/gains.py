@@ -1,4 +1,4 @@
-"""The body-frame gains that a law's gains amount to, and whether they fit the control period."""
+"""Body-frame gains of a law, and whether they fit the control period."""
 
 from typing import Any
 

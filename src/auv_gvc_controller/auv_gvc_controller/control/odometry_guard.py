@@ -1,4 +1,4 @@
-"""Which odometry may be used: stamps that go forward, are young and do not jump; true speeds."""
+"""Acceptance of odometry: stamps must go forward, be recent and not jump; speeds be plausible."""
 
 import math
 from dataclasses import dataclass

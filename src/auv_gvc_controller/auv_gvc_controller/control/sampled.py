@@ -1,4 +1,4 @@
-"""A law between samples: zero-order hold, as the nodes and `simulate(hold='zoh')` run it."""
+"""A sampled law with zero-order hold, as the nodes and `simulate(hold='zoh')` run it."""
 
 import math
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Set-points on their way to a law: which one belongs to an odometry, and the reference filter."""
+"""Buffer of set-points: the one that belongs to an odometry, and the reference filter."""
 
 import math
 from collections import OrderedDict

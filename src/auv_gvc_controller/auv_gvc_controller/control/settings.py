@@ -1,4 +1,4 @@
-"""Everything that makes a controller but law, gains and vehicle: defaults, ranges, construction."""
+"""Settings of a controller beside law, gains and vehicle: defaults, ranges, construction."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What a law knows of the vehicle: the terms of (1) and the decomposition of M, (4) and (9)."""
+"""The model in a law: the terms of (1) and the decomposition of M, (4) and (9)."""
 
 from typing import NamedTuple
 

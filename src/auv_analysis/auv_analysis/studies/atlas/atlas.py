@@ -1,4 +1,4 @@
-"""How strongly the inertia of vehicles couples their degrees of freedom, without units."""
+"""Strength of inertial coupling between degrees of freedom, without units, vehicle by vehicle."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace

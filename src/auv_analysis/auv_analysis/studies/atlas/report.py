@@ -1,4 +1,4 @@
-"""The report of the atlas: a ranking, who is coupled to whom, and what case 1 makes of it."""
+"""The report of the atlas: a ranking, the couplings of each vehicle, and their effect in case 1."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A comparison of any number of runs: the table with a row each, its report, what it found."""
+"""The report of a comparison of any number of runs: a table with a row each, and its findings."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What `auv analyze` is given: bags, samples, folders of results, scenarios; sweeps apart."""
+"""Arguments of `auv analyze`: bags, samples, result folders, scenarios; sweeps apart."""
 
 import os
 from collections.abc import Iterable, Sequence

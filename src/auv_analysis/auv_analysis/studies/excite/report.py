@@ -1,4 +1,4 @@
-"""What an excitation promises: tables, sentences, terminal, page and files."""
+"""The report of an excitation: expected intervals as tables, sentences, page and files."""
 
 from collections.abc import Mapping
 from pathlib import Path

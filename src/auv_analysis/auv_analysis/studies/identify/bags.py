@@ -1,4 +1,4 @@
-"""Records of bags: of ours without a word, of others with a mapping."""
+"""Records for identification from bags: ours as they are, others with a mapping."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

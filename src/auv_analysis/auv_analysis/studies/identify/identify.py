@@ -1,4 +1,4 @@
-"""The procedure: recordings and a prior in, a model with its uncertainty out."""
+"""The identification: from recordings and a prior to a model with its uncertainty."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace

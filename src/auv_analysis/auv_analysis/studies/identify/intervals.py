@@ -1,4 +1,4 @@
-"""Intervals on request, beside those of the sandwich: block bootstrap and profile likelihood."""
+"""Confidence intervals on request: block bootstrap and profile likelihood."""
 
 from dataclasses import dataclass, replace
 

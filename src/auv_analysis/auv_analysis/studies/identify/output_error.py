@@ -1,4 +1,4 @@
-"""Output error: the model alone is simulated along segments, and its misfit made small.
+"""Output-error method: the model is simulated along segments, its misfit minimised.
 
 Each segment has a start of its own, nine unknowns that only it depends on (multiple shooting).
 Segments are simulated in batches and added up to normal equations of theta; of each one there

@@ -1,4 +1,4 @@
-"""What contradicts the prior so much that the recording, or its reading, is likelier to be wrong.
+"""Plausibility of an estimate against the prior: signs that the recording or its reading is wrong.
 
 A fit may be perfect and still mean something else: a wrench ten times too large makes every
 coefficient ten times too large, and a recording in ENU and FLU taken for NED and FSD is that of a

@@ -1,4 +1,4 @@
-"""What an identification came to: tables, verdict, terminal, page and files."""
+"""The report of an identification: tables, verdict, terminal, page and files."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

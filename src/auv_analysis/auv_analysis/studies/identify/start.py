@@ -1,4 +1,4 @@
-"""A start by weighted linear least squares: (1) is linear in M, D and g.
+"""Initial estimate by weighted linear least squares: (1) is linear in M, D and g.
 
 Velocities, their rates and the command are local polynomials over the same windows; a pure delay of
 the command, which stands for lag and delay, is scanned. Noise in the regressors and the lag bias

@@ -1,4 +1,4 @@
-"""What is to be found, as numbers without bounds or units: theta, zero at the prior.
+"""The unknown parameters theta: unbounded, without units, zero at the prior.
 
 M = S R R^T S with S = sqrt(diag M) of the prior and R lower triangular, its diagonal by its
 logarithm: M is symmetric positive definite whatever theta is. Lag and gains go by their logarithm,

@@ -1,4 +1,4 @@
-"""Whether residuals are white: a number for each velocity, and a sentence."""
+"""Whiteness of residuals: a number for each velocity, and a sentence."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

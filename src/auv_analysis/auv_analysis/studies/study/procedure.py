@@ -1,4 +1,4 @@
-"""What a change of the gains does: the file, a table per controller, a plot, sentences."""
+"""The paper's procedure in a report: step 3 (sensitivity), samples, step 6 (discussion)."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial

@@ -1,4 +1,4 @@
-"""Which KPIs of a closed loop follow its gains most, and which gain it is: step 3.
+"""Sensitivity of a closed loop's KPIs to its gains: step 3.
 
 A sweep of the gains: a design of factors, rollouts at its points, Sobol' or Morris indices of the
 logarithms of the KPIs.

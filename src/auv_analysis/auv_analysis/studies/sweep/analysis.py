@@ -1,4 +1,4 @@
-"""All that is computed of a sweep: quantiles, what matters, pairs, the best rows, as results."""
+"""Analysis of a sweep: quantiles, sensitivities, pairs, the best rows, as results."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -1,4 +1,4 @@
-"""Campaign file, format 1: which rollouts of which scenario, resolved and checked."""
+"""Campaign file, format 1: the rollouts of a scenario, resolved and checked."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property

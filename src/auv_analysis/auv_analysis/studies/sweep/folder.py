@@ -1,4 +1,4 @@
-"""The folder of a sweep: what it was made of, and the parts that are finished.
+"""The folder of a sweep: its inputs, and the parts that are finished.
 
 Whatever is in it under its final name is complete: everything is written under another name,
 flushed to the disk and then renamed, a part once the manifest of the folder lists its digest. A

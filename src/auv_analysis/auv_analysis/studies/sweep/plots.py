@@ -1,4 +1,4 @@
-"""Plots of a sweep: distributions, what matters, dependence on one path and on two, failures."""
+"""Plots of a sweep: distributions, sensitivities, dependence on one path and on two, failures."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial

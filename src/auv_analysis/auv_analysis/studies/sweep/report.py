@@ -1,4 +1,4 @@
-"""The report of a sweep: what varies, how measures are distributed, what they depend on."""
+"""The report of a sweep: variations, distributions of the measures, and their dependence."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path

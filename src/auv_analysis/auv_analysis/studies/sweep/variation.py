@@ -1,4 +1,4 @@
-"""What a campaign varies: grids, lists side by side, and designs of distributions.
+"""Variations of a campaign: grids, lists side by side, and designs of distributions.
 
 The values of a rollout depend on the root seed and on its position alone, not on what was asked
 for before: any part of a sweep is had at the same cost.

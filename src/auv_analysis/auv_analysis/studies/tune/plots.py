@@ -1,4 +1,4 @@
-"""Plots of a tuning: what effort buys, and what the draws do to it."""
+"""Plots of a tuning: error against effort, and its spread over the draws."""
 
 from collections.abc import Sequence
 from functools import partial

@@ -167,7 +167,7 @@ def law_and_gains(controller: dict[str, Any], bag: Path) -> tuple[str, dict[str,
 
 
 def notes_on(law: str) -> list[str]:
-    """What is worth saying of a law."""
+    """Notes on a law."""
     if not is_unasked(law):
         return []
     return [f'gains of {law} not looked at: a bag brings no code; --law {law} imports its module']
@@ -211,7 +211,7 @@ def vehicle_of(contents: BagContents, bag: Path, vehicle: str | Path | None) -> 
 
 
 def scenario_of(contents: BagContents, bag: Path) -> Scenario:
-    """What the scenario of the bag says, None where it carries none."""
+    """Scenario of the bag; None where it carries none."""
     text = contents.attachments.get('scenario.yaml')
     return None if text is None else parse_yaml(text, f'{bag}: scenario.yaml', 'scenario')
 

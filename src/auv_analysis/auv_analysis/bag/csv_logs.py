@@ -61,7 +61,7 @@ def blocks_of_csv(
 
 
 class Span(NamedTuple):
-    """How many numbers a column has, and the least and the largest."""
+    """Number of values in a column, the least and the largest."""
 
     filled: int
     low: float

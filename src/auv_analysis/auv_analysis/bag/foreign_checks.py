@@ -152,7 +152,7 @@ def _measured(*rows: np.ndarray) -> np.ndarray:
 
 
 def _misread(pair: RatePair, i: int, fits: float) -> str:
-    """What the two say of an axis where they differ; '' where they do not."""
+    """Statement on an axis where the two differ; '' where they do not."""
     one = pair.part(slice(i, i + 1))
     by_path, by_twist, apart = one.sizes
     size = max(by_path, by_twist)
@@ -221,7 +221,7 @@ def delays(tracks: Mapping[str, Track], frame: str) -> list[str]:
 
 
 def behind(t: np.ndarray, path: np.ndarray, velocity: np.ndarray) -> Delay | None:
-    """How far a velocity (n, 3) is behind the rate of its path (n, 3); None where that is not told.
+    """Delay of a velocity (n, 3) behind the rate of its path (n, 3); None where it cannot be told.
 
     Both pass one filter; the delay is the one that leaves least of their difference.
     """
@@ -243,7 +243,7 @@ def behind(t: np.ndarray, path: np.ndarray, velocity: np.ndarray) -> Delay | Non
 
 
 def acts_behind(pose: Track, twist: Track, wrench: Track) -> Delay | None:
-    """How far a wrench acts behind its stamps; None where that is not told.
+    """Delay of a wrench behind its stamps; None where it cannot be told.
 
     The acceleration is regressed on the wrench of an earlier time and on all that (1) has beside
     it: velocities, their products and squares with sign, and the direction of gravity, all

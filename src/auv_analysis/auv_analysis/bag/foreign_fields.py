@@ -151,7 +151,7 @@ def _check_unit(unit: object, fitting: set[str], key: str, origin: object) -> No
 
 
 def factor(name: str, units: Units) -> float:
-    """How many SI units one unit of a component is, by units that `check_fields` let pass."""
+    """Conversion factor of a component to SI, for units that `check_fields` accepted."""
     unit = units.get(name, '') if isinstance(units, Mapping) else units
     if not isinstance(unit, str):
         return float(unit)
@@ -160,7 +160,7 @@ def factor(name: str, units: Units) -> float:
 
 
 class Reading(NamedTuple):
-    """What one message says.
+    """Values of one message.
 
     Attributes
     ----------
@@ -224,7 +224,7 @@ class MessageReader:
         return Reading(stamp, frame, child, row)
 
     def _timed(self, message: Any) -> Callable[[Any], Any] | None:
-        """How the stamp of a message in ns is read; None where it has none."""
+        """Reader of a message's stamp in ns; None where it has none."""
         if self._stamp is None:
             stamp = getattr(getattr(message, 'header', None), 'stamp', None)
             return (lambda m: nanoseconds(m.header.stamp)) if stamp is not None else None
@@ -237,7 +237,7 @@ class MessageReader:
         return lambda m: _scaled(get(m), TIMES[unit])
 
     def _taken(self, message: Any) -> Callable[[Any], tuple[Any, ...]]:
-        """How the numbers of a message are read."""
+        """Reader of a message's numbers."""
         keys = [f'fields.{name}' for name in self.names]
         keys = keys or [f'fields[{i}]' for i in range(len(self._paths))]
         plain: list[str] = []
@@ -285,7 +285,7 @@ class MessageReader:
 
     @property
     def converted(self) -> str:
-        """Which numbers are turned into SI, for a note; '' where none are."""
+        """Numbers converted to SI, for a note; '' where there are none."""
         said: dict[str, list[str]] = {}
         for name in self.names or (THRUSTS,):
             unit = self._units.get(name) if isinstance(self._units, Mapping) else self._units
@@ -352,7 +352,7 @@ def _check_number(message: Any, value: Any, path: str, key: str) -> None:
 
 
 def _listed(message: Any, path: str) -> str:
-    """Which paths to numbers there are, as a refusal ends; those within what was asked for."""
+    """Known paths to numbers, as the end of a refusal; those within the requested one."""
     every = [name for name, _ in numbers(message)]
     inside = [name for name in every if re.match(re.escape(path) + r'[.\[]', name)]
     named = inside or every

@@ -113,7 +113,7 @@ def _is_one_clock(of: Recorded) -> bool:
 
 
 def logged_with(of: Recorded, clock: Recorded) -> Recorded:
-    """What was logged while the kept part of another topic was."""
+    """Messages logged during the kept part of another topic."""
     return of.part((of.log >= clock.log.min()) & (of.log <= clock.log.max()))
 
 

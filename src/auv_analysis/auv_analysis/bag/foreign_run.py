@@ -90,7 +90,7 @@ class Unexplained:
     noise: np.ndarray
 
     def figures(self) -> dict[str, Any]:
-        """How the acceleration was estimated, for `summary.json`."""
+        """Method of the acceleration's estimate, for `summary.json`."""
         return {
             'filter': FILTER,
             'order': ORDER,
@@ -362,7 +362,7 @@ def _notes_on_missing(bag: Path, mapping: TopicMap) -> list[str]:
 
 
 def _notes_on_run(eta: np.ndarray, nu: np.ndarray, tau: np.ndarray) -> list[str]:
-    """Which components of the motion and of a recorded wrench are not known."""
+    """Components of the motion and of a recorded wrench that are not known."""
     rows = np.concatenate([eta[0], nu[0], [] if np.isnan(tau[0]).all() else tau[0]])
     names = (*MOTION, *(f'tau_{axis}' for axis in FORCE + TORQUE))
     lacking = [name for name, x in zip(names, rows, strict=False) if np.isnan(x)]

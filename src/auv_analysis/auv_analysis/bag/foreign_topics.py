@@ -79,7 +79,7 @@ class MappedTopic:
 
 @dataclass(frozen=True)
 class TopicMap:
-    """How a bag is to be read.
+    """Options for reading a bag.
 
     Attributes
     ----------
@@ -154,7 +154,7 @@ def _untold_angles(data: Mapping[str, Any]) -> set[str]:
 
 
 def _entry(told: Any) -> Any:
-    """What a mapping says of a role, a name written as a mapping with `topic`."""
+    """Entry of a role in a mapping; a bare name becomes a mapping with `topic`."""
     if isinstance(told, list):
         return [_entry(part) for part in told]
     return {'topic': told} if isinstance(told, str) else told

@@ -109,7 +109,7 @@ def tracks_of(
 
 
 def unknown_angles(pose: Track, mapping: TopicMap) -> tuple[str, ...]:
-    """Which of phi, theta and psi were not measured."""
+    """Those of phi, theta and psi that were not measured."""
     return tuple(name for name in EULER if name in mapping.unknown or not pose.given[-1])
 
 
@@ -200,7 +200,7 @@ def _evenly(stamps: np.ndarray, limit: float) -> np.ndarray:
 
 
 def _said(axes: Mapping[str, str], found: Mapping[str, Recorded]) -> str:
-    """Which axes the topics have and who says so."""
+    """Axes of the topics, and the source of that statement."""
     parts = []
     for told in dict.fromkeys(axes.values()):
         members = [found[role].source for role in axes if axes[role] == told and told]
@@ -325,7 +325,7 @@ def _reversed(told: Sequence[str | int], names: Sequence[str], origin: object) -
 def _said_of_curve(
     curve: ThrusterCurve, commands: np.ndarray, mirrored: np.ndarray, topic: str
 ) -> str:
-    """Which curve was taken, how much of the time it was dead or at its end."""
+    """Thruster curve in use, and the share of time within its dead band or at its end."""
     thrusts = curve.thrust(commands, mirrored)
     ends = np.isin(thrusts, [curve.thrusts[0], curve.thrusts[-1]]).mean()
     still = (thrusts == 0.0).mean()

@@ -184,7 +184,7 @@ class Spacing:
 
 
 class Inspection:
-    """What is found in a file.
+    """Findings of a file's inspection.
 
     Attributes
     ----------
@@ -245,7 +245,7 @@ class Inspection:
         return None if self.lost else 0
 
     def extent(self, name: str) -> FileExtent:
-        """What can be kept, as a file of some name."""
+        """The part that can be kept, as a file of some name."""
         extent = FileExtent(name)
         for number, spacing in self.spacings.items():
             channel = self.definitions.channel(number)
@@ -296,7 +296,7 @@ class Inspection:
 
 @dataclass
 class FileReport:
-    """What became of a file: 'healthy', 'repaired' or 'left out'."""
+    """Outcome for a file: 'healthy', 'repaired' or 'left out'."""
 
     inspection: Inspection
     name: str
@@ -321,7 +321,7 @@ class FileReport:
 
 @dataclass
 class Report:
-    """What became of a bag.
+    """Outcome of a bag's repair.
 
     Attributes
     ----------

@@ -40,7 +40,7 @@ class TooManyError(TooLargeError):
 
 
 class Counts:
-    """What a file may still hold; a hostile one of some kilobytes declares millions of records.
+    """Remaining budget of a file; a hostile one of some kilobytes declares millions of records.
 
     Parameters
     ----------

@@ -77,7 +77,7 @@ BUDGET = 8  # bytes that are looked into in vain, per byte of the file
 
 
 class MessageIndex(NamedTuple):
-    """How many messages of a channel lie in the chunk before it."""
+    """Number of messages of a channel in the chunk before it."""
 
     channel: int
     messages: int
@@ -278,7 +278,7 @@ class McapFile:
                 place = proven = entered.end
 
     def _tail(self, place: int) -> Iterator[Lost]:
-        """What stands behind the footer, where that is not the end of an MCAP file."""
+        """Bytes behind the footer, where that is not the end of an MCAP file."""
         tail = self._bytes(place, len(MAGIC))
         self.ends_well = tail == MAGIC
         if self.ends_well:

@@ -45,7 +45,7 @@ class Definition:
 
 @dataclass
 class FileExtent:
-    """What lies in a bag or a file of it: messages per topic, first and last log time in ns."""
+    """Contents of a bag or a file of it: messages per topic, first and last log time in ns."""
 
     name: str = ''
     counts: dict[str, int] = field(default_factory=dict)
@@ -67,7 +67,7 @@ class FileExtent:
 
 @dataclass
 class TopicExtent:
-    """How many messages a topic has, and first and last time of logging, ns."""
+    """Number of a topic's messages, first and last log time, ns."""
 
     first: int
     last: int = 0
@@ -87,7 +87,7 @@ class TopicExtent:
 def metadata(
     definitions: Iterable[Definition], extents: Sequence[FileExtent], *, packed: bool = False
 ) -> dict[str, Any]:
-    """What stands below `rosbag2_bagfile_information`.
+    """Contents of `rosbag2_bagfile_information`.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def qos_text(qos: list[Any]) -> str:
 
 
 def offered_profiles(text: str) -> list[Any]:
-    """What `qos_text` wrote; none of what is no list of them, or one that refers to itself."""
+    """QoS profiles as `qos_text` writes them; none of a text without any, or that names itself."""
     if '*' in text:
         return []
     try:
@@ -255,7 +255,7 @@ def split_order(path: Path) -> tuple[int, str]:
 
 
 def recording_text(strict: bool, names: Mapping[str, str], namespace: str = '/') -> str:
-    """What the recorder notes of its recording, as an attachment.
+    """The recorder's notes on its recording, as an attachment.
 
     Parameters
     ----------

@@ -196,7 +196,7 @@ class OnboardLog:
 
 
 def _code(character: str) -> tuple[str, float | None]:
-    """How a field is packed, and its scale; ValueError for a format that nobody knows."""
+    """Packing of a field, and its scale; ValueError for an unknown format."""
     from pymavlink.DFReader import FORMAT_TO_STRUCT
 
     if character not in FORMAT_TO_STRUCT:

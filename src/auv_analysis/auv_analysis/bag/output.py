@@ -35,7 +35,7 @@ PER_TOPIC = 512  # bytes of a topic in the metadata, beside its profiles
 
 @dataclass(frozen=True)
 class Storage:
-    """What a bag writer is asked for.
+    """Settings of a bag writer.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ class Output:
             self._fd = -1
 
     def loss(self) -> str:
-        """What somebody else did to the file under us; empty when nothing."""
+        """Change of the file by another process; empty when there was none."""
         position = self.position
         try:
             found = self._identity_of_path()

@@ -68,7 +68,7 @@ STEPS = ((5e6, 'ns'), (5e3, 'us'), (5.0, 'ms'), (0.0, 's'))  # mean step above w
 
 @dataclass
 class Looked:
-    """What the messages of a topic were found to hold.
+    """Contents found in the messages of a topic.
 
     Attributes
     ----------
@@ -392,7 +392,7 @@ def _role(role: str, shown: Sequence[tuple[dict[str, Any], str]]) -> list[str]:
 
 
 def _lacking(roles: Mapping[str, Any], looked: Mapping[str, Looked]) -> list[str]:
-    """Which components no topic has, and the angular velocity by the attitude."""
+    """Components that no topic has, and the angular velocity by the attitude."""
     lines = []
     for role in ('pose', 'twist', 'wrench'):
         names = {

@@ -187,7 +187,7 @@ def usual_limit(ns: np.ndarray) -> float:
 
 @dataclass
 class BagContents(FileExtent):
-    """What lies in a bag, before anything is made of it.
+    """Contents of a bag, before anything is computed from it.
 
     Attributes
     ----------

@@ -259,7 +259,7 @@ def _settle_metadata(folder: Path, report: Report) -> str:
 
 
 def _gist(document: dict[str, Any]) -> Any:
-    """What must agree: files, counts and span."""
+    """Files, counts and span, which must agree."""
     return (
         [*document['relative_file_paths']],
         document['message_count'],
@@ -317,7 +317,7 @@ def watch(path: Path, before: tuple[int, int, int]) -> None:
 
 
 def state(path: Path) -> tuple[int, int, int]:
-    """What changes when a file is written or replaced."""
+    """Fingerprint that changes when a file is written or replaced."""
     status = path.stat()
     return status.st_ino, status.st_size, status.st_mtime_ns
 
@@ -379,5 +379,5 @@ def set_aside(path: Path) -> str:
 
 
 def failed(path: Path, error: OSError) -> FailedError:
-    """What ends a repair that the system does not let happen."""
+    """Error that ends a repair which the system does not permit."""
     return FailedError(f'{error.filename or path}: {reason(error)}; the file is as it was')

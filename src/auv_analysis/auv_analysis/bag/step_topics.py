@@ -68,7 +68,7 @@ def role_of(topic: str) -> str:
 
 
 def namespace_of(topic: str) -> str:
-    """What stands before our name of a topic."""
+    """Prefix of our name of a topic."""
     return topic.removesuffix(role_of(topic))
 
 
@@ -174,7 +174,7 @@ class Decoding:
 
 
 def refusal(path: Path, topic: str, expected: str, error: Exception) -> InputError:
-    """What a library said, as one line of ours."""
+    """Message of a library, as one line of ours."""
     return InputError(path, topic, expected, first_line(error))
 
 

@@ -225,7 +225,7 @@ class BagWriter:
             self._look()
 
     def _look(self) -> None:
-        """What the thread does every tenth of a second; whatever it raises ends the recording."""
+        """Work of the thread every tenth of a second; whatever it raises ends the recording."""
         if self._health.broken:
             return
         with self._lock:

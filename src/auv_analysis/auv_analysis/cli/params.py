@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _missing(controller: dict[str, Any], node: str) -> str:
-    """What the controller will not be configured without, where the scenario does not say it."""
+    """Parameters that the controller needs and the scenario does not give."""
     from auv_analysis.replay.open_loop import recorded_settings
 
     try:

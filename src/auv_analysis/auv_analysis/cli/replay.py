@@ -230,7 +230,7 @@ def _concluded(document: dict[str, Any], node: Any) -> dict[str, Any]:
 
 
 def _open_loop(options: argparse.Namespace) -> dict[str, Any]:
-    """What a law would have commanded; returns metrics of both wrenches."""
+    """Compute the wrench of another law; returns metrics of both wrenches."""
     from auv_analysis.output.folder import check_free, results_folder
     from auv_analysis.output.new_files import write_json
     from auv_analysis.output.progress import say, waiting

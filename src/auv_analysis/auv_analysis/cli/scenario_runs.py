@@ -175,7 +175,7 @@ def _estimate(summary: Mapping[str, Any], kind: str) -> Table:
 
 
 def _remarks(summary: Mapping[str, Any]) -> Iterable[str]:
-    """What the tables leave open: window of the energy, zeros, errors that do not settle."""
+    """Notes on the tables: window of the energy, zeros, errors that do not settle."""
     energy = summary['kinetic_energy']
     first, last = (plain(time) for time in energy['window'])
     if energy['mean'] is not None:

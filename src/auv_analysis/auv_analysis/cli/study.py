@@ -117,7 +117,7 @@ def _examine(
     runs: Mapping[str, Run],
     summaries: Mapping[str, Mapping[str, Any]],
 ) -> dict[str, Any]:
-    """What the report has beside the runs, and the Parquet files that it rests on."""
+    """Parts of the report beside the runs, and the Parquet files behind them."""
     from auv_analysis.herman2018.cases import claims_sentences, paper_claims
     from auv_analysis.herman2018.paper import CASES
     from auv_analysis.output.progress import waiting

@@ -1,1 +1,1 @@
-"""What is wrong with the set-up: it must run where packages are broken, so checks import late."""
+"""Checks of the set-up; they must run where packages are broken, and so import late."""

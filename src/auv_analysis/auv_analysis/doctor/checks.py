@@ -238,7 +238,7 @@ def middleware() -> Iterator[Finding]:
 
 
 def discovery_range() -> Iterator[Finding]:
-    """How far nodes are heard."""
+    """Discovery range of nodes."""
     value = os.environ.get(RANGE)
     if os.environ.get('ROS_LOCALHOST_ONLY', '0') not in ('', '0'):
         found = 'ROS_LOCALHOST_ONLY is set: it is deprecated and overrides the range'
@@ -335,7 +335,7 @@ def _in_use(folder: Path) -> set[str]:
 
 
 def files() -> Iterator[Finding]:
-    """How many files a process may open: a participant takes some dozens."""
+    """Limit of open files per process: a participant takes some dozens."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     limit = hard if soft == resource.RLIM_INFINITY else soft
     if limit == resource.RLIM_INFINITY:
@@ -359,7 +359,7 @@ def clock() -> Iterator[Finding]:
 
 
 def cores() -> Iterator[Finding]:
-    """How many cores there are: a run has five nodes that wait for one another."""
+    """Number of cores: a run has five nodes that wait for one another."""
     count = len(os.sched_getaffinity(0))
     advice = '' if count > 1 else 'auv run --composed takes one process: it is faster there'
     yield Finding('cores', 'ok' if count > 1 else 'warning', f'{count}', advice)

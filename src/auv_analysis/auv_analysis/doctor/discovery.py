@@ -101,7 +101,7 @@ def _start(
 
 
 def _answer(process: subprocess.Popen[str]) -> dict[str, Any]:
-    """What a participant printed; `why` where it could not take part."""
+    """Output of a participant; `why` where it could not take part."""
     try:
         out, errors = process.communicate(timeout=STARTS + PATIENCE)
     except subprocess.TimeoutExpired:

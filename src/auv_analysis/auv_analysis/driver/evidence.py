@@ -32,7 +32,7 @@ Number = float | int | None
 
 @dataclass(frozen=True)
 class Settings:
-    """What is expected of odometry: by default what the controller's parameters ask for.
+    """Requirements on odometry: by default those of the controller's parameters.
 
     Attributes
     ----------
@@ -168,7 +168,7 @@ class DriverRecord:
 
     @property
     def uncommanded(self) -> np.ndarray:
-        """Which samples (n,) of the motion arrived before the first wrench."""
+        """Mask (n,) of the samples of motion that arrived before the first wrench."""
         arrived, sent = self._poses[2], self.excitation.sent if self.excitation else ()
         began = next((ns for one in sent for ns, _ in one.steps), arrived[-1] + 1)
         return np.asarray(arrived < began)
@@ -197,7 +197,7 @@ class DriverRecord:
 
     @cached_property
     def trials(self) -> list[MeasuredTrial]:
-        """What was heard of the wrenches that were sent."""
+        """Reception of the wrenches that were sent."""
         return self.excitation.measured(self.log) if self.excitation else []
 
     @property
@@ -208,7 +208,7 @@ class DriverRecord:
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What was expected of a driver and what was found.
+    """A finding on a driver: what was expected and what was found.
 
     Attributes
     ----------
@@ -261,5 +261,5 @@ def unchecked(expected: str, why: str, advice: str = '', **numbers: Number) -> C
 
 
 def counts(findings: Sequence[CheckResult]) -> dict[str, int]:
-    """How many findings there are of each verdict."""
+    """Number of findings by verdict."""
     return {verdict: sum(f.verdict == verdict for f in findings) for verdict in VERDICTS}

@@ -47,7 +47,7 @@ class DriverClient(Protocol):
 
     @property
     def buffer(self) -> OdometryBuffer:
-        """What has been heard so far."""
+        """Messages heard so far."""
 
     def send(self, tau: Wrench) -> int:
         """Publish a wrench; when it left, ns of this machine's clock."""
@@ -65,7 +65,7 @@ class DriverClient(Protocol):
         """Publish no more."""
 
     def now_ns(self) -> int:
-        """What the clock of this machine shows, ns."""
+        """Time of this machine's clock, ns."""
 
 
 @dataclass
@@ -87,7 +87,7 @@ class Sent:
 
 @dataclass(frozen=True)
 class Excitation:
-    """What was sent of a plan, and why it ended early; empty: it did not."""
+    """Part of a plan that was sent, and why it ended early; empty: it did not."""
 
     plan: Plan
     sent: Sequence[Sent]
@@ -342,7 +342,7 @@ def _noise(sent: Sequence[Sent], log: OdometryLog) -> Noise:
 
 
 def _measured(vehicle: Vehicle, sent: Sent, log: OdometryLog, noise: Noise) -> MeasuredTrial | None:
-    """What was heard of a trial; None where it was broken off or too little came."""
+    """Record of a trial; None where it was broken off or too little came."""
     if not sent.ended_ns:
         return None
     began = next(ns for ns, tau in sent.steps if tau != ZERO) - round(REST * NANOSECONDS)

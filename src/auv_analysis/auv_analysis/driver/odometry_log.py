@@ -58,7 +58,7 @@ class OdometryLog:
 
     @property
     def finite(self) -> np.ndarray:
-        """Which messages (n,) have finite numbers only."""
+        """Mask (n,) of the messages that have finite numbers only."""
         return np.isfinite(self.x).all(axis=1)
 
 

@@ -91,13 +91,13 @@ class Trial:
 
     @property
     def seconds(self) -> float:
-        """How long it takes."""
+        """Duration."""
         return sum(seconds for _, seconds in self.parts) + (UNHEARD if self.silent else 0.0)
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is going to be sent.
+    """The wrenches that will be sent.
 
     Attributes
     ----------
@@ -113,11 +113,11 @@ class Plan:
 
     @property
     def speed(self) -> float:
-        """What no velocity passes by the model, m/s and rad/s."""
+        """Bound of every velocity by the model, m/s and rad/s."""
         return max(trial.speed for trial in self.trials)
 
     def lines(self) -> list[str]:
-        """What is going to happen, for people."""
+        """Announcement of the plan, for people."""
         seconds = sum(trial.seconds for trial in self.trials)
         moved = [f'{one.dof} ±{one.size:.3g} {one.unit}' for one in self.trials if not one.silent]
         last = self.trials[-1]

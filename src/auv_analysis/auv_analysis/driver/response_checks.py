@@ -120,7 +120,7 @@ class Delay(NamedTuple):
 
     @property
     def option(self) -> str:
-        """What `auv linearize` is told of it."""
+        """The same as an option of `auv linearize`."""
         return f'--delay {self.seconds:.3g}'
 
     def document(self) -> dict[str, Any]:

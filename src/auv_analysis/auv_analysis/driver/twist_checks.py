@@ -149,7 +149,7 @@ def _frame(evidence: DriverRecord, half: str, unit: str, expected: str) -> Check
 
 
 def _cause(evidence: DriverRecord, fit: TwistFit, half: str, unit: str) -> tuple[str, str]:
-    """What the twist seems to be instead, and how to mend it."""
+    """The likely convention of the twist, and the remedy."""
     told = f'in those of child_frame_id it is off by {_percent(fit.off[CHILD])}'
     if fit.off[fit.best] <= FITS and fit.best != CHILD:
         text, advice = TWIST_READINGS[half][fit.best]
@@ -204,7 +204,7 @@ class Standstill(NamedTuple):
 
     @property
     def bias(self) -> float:
-        """How much the two differ, where that is more than noise, m/s."""
+        """Difference of the two, where it exceeds the noise, m/s."""
         return self._told(self.twist - self.drift)
 
     @property

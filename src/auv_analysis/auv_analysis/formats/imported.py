@@ -14,7 +14,7 @@ SNAME, POSITIVE = 'sname', 'positive'
 
 @dataclass(frozen=True)
 class Choices:
-    """What a user says of a file that the file itself does not; None: nothing.
+    """Facts that a user adds to a file; None: nothing.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Choices:
 
 @dataclass
 class ImportedVehicle:
-    """What an importer gathers.
+    """Numbers gathered by an importer.
 
     Attributes
     ----------

@@ -66,7 +66,7 @@ def sdf_text(vehicle: Vehicle, environment: dict[str, Any], file: object, added_
 
 
 def notes(vehicle: Vehicle, added_mass: str) -> list[str]:
-    """What Gazebo cannot hold of a vehicle, or does otherwise, a sentence each."""
+    """Limits and differences of Gazebo's model of a vehicle, a sentence each."""
     found = ['Axes of the link: forward, left, up. Its origin is that of the vehicle file.']
     M_A, M_RB = vehicle.M_A, vehicle.M_RB
     assert M_A is not None

@@ -59,7 +59,7 @@ def _is_on(plugin: Element, tag: str) -> bool:
 
 
 def _settings(draft: ImportedVehicle, plugin: Element) -> None:
-    """What Gazebo leaves out or adds by the plugin's settings, and a vehicle file does not."""
+    """Differences between Gazebo's model under the plugin's settings and a vehicle file."""
     for tag, force in (('disable_added_mass', 'M_A nu_dot'), ('disable_coriolis', 'C_A nu')):
         if _is_on(plugin, tag):
             draft.traps.append(f'{tag}: Gazebo leaves {force} out, we do not')

@@ -103,7 +103,7 @@ def case_evidence(
 
 
 def departures_of(scenario: Scenario) -> Iterator[tuple[str, Any, Any]]:
-    """What a scenario has other than the shipped one of its name: path, its value, the shipped."""
+    """Differences to the shipped scenario of the same name: path, its value, the shipped."""
     shipped = load_scenario(scenario.name)
     for key in COMPARED:
         yield from _differences(key, scenario.data[key], shipped.data[key])
@@ -142,7 +142,7 @@ def _responses(
 
 
 def claims_sentences(found: PaperClaims) -> list[Sentence]:
-    """What a reader of the claims table must know of the scenario; nothing for a shipped one."""
+    """Note on the scenario beside the table of claims; nothing for a shipped one."""
     if found.reason:
         return [Sentence(f'The paper’s claims are not judged: {found.reason}.')]
     changes = [f'{path} = {ours} (shipped: {theirs})' for path, ours, theirs in found.departures]

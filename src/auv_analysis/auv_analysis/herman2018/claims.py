@@ -344,7 +344,7 @@ def claims_part(out: Path, claims: Sequence[Claim], runs: Mapping[str, RunInfo])
 
 
 def _counts(claims: Sequence[Claim]) -> Iterator[str]:
-    """How many of the claims were decided, and how."""
+    """Number of claims by verdict."""
     if not claims:
         return
     counts = {word: [c for c in claims if c.verdict == word] for word in DECIDED}

@@ -87,7 +87,7 @@ DECIDED: tuple[Verdict, ...] = ('reproduced', 'partly', 'not reproduced')
 
 
 class Judgement(NamedTuple):
-    """What a judge says.
+    """Verdict of a judge.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ class Signals:
 
 @dataclass(frozen=True, eq=False)
 class ErrorSensitivity:
-    """How the RMS velocity errors under one law answer to what is changed.
+    """Response of the RMS velocity errors under one law to changes.
 
     Attributes
     ----------

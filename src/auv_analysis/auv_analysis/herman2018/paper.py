@@ -69,7 +69,7 @@ def paper_figure(run: RunInfo, kind: str) -> str | None:
 
 
 def paper_figures(run: RunInfo) -> list[str]:
-    """Which figures of a run show what a figure of the paper shows, in words."""
+    """Figures of a run that correspond to a figure of the paper, in words."""
     kinds = ('errors', 'lumped_error', 'inputs', 'delta_xi', 'delta_pi')
     found = {kind: paper_figure(run, kind) for kind in kinds}
     return [f'{kind} is the paper’s figure {number}' for kind, number in found.items() if number]

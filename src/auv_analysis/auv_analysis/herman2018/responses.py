@@ -62,7 +62,7 @@ def rms_errors(run: Run) -> np.ndarray:
 def response(
     scenario: Scenario, controller: str, found: Sensitivity, hold: Hold = 'continuous'
 ) -> ErrorSensitivity | None:
-    """What the RMS errors of a controller follow; None where its loops do not all run.
+    """What a controller's RMS errors depend on; None where its loops do not all run.
 
     The set-points are sums of sinusoids; `found` is its sensitivity to the gains.
     """

@@ -24,7 +24,7 @@ def both_ways(run: Run) -> tuple[np.ndarray, np.ndarray]:
 def beyond_authority(
     vehicle: Vehicle, largest: Sequence[float], ways: Sequence[np.ndarray] | None = None
 ) -> list[str]:
-    """What is remarkable of the largest commands of a run, a phrase each; none where all is well.
+    """Remarks on the largest commands of a run, a phrase each; none where all is well.
 
     Parameters
     ----------

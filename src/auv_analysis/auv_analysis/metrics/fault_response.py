@@ -122,7 +122,7 @@ def _of(parts: Sequence[Part | None], name: str, column: int) -> tuple[Any, ...]
 
 
 class _Recovery:
-    """How long after the end of one fault the errors settle, block by block."""
+    """Settling time of the errors after the end of one fault, block by block."""
 
     def __init__(self, mark: Mark, run: RunInfo):
         self._mark, self._run = mark, run

@@ -53,7 +53,7 @@ def _zeros() -> np.ndarray:
 
 @dataclass
 class Moments:
-    """What is kept of some samples; the rows are those of `NAMES`.
+    """Moments of some samples; the rows are those of `NAMES`.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Moments:
         adding(nu, nu_d, tau, f, F, maps, self.sums, self.squares, self.peaks)
 
     def joined(self, other: 'Moments') -> 'Moments':
-        """What is known of these samples and those of the other."""
+        """Moments of these samples and those of the other together."""
         return Moments(
             self.count + other.count,
             min(self.first, other.first),

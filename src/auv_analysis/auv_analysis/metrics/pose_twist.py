@@ -76,7 +76,7 @@ def turned(q: np.ndarray) -> np.ndarray:
 
 
 def w_first(q: np.ndarray) -> np.ndarray:
-    """What was meant by quaternions (n, 4) whose w was written first, into x."""
+    """Quaternions (n, 4) reordered where w was written first, into x."""
     return np.roll(q, -1, axis=1)
 
 
@@ -198,7 +198,7 @@ def compare_rates(t: np.ndarray, path: np.ndarray, velocity: np.ndarray) -> Rate
 
 @dataclass(frozen=True)
 class TwistFit:
-    """How well each reading of one half of the twist fits.
+    """Misfit of each reading of one half of the twist.
 
     Attributes
     ----------

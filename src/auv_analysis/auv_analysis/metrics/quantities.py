@@ -17,7 +17,7 @@ HALVES = {'linear': DOFS[:3], 'angular': DOFS[3:]}
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a number is.
+    """A quantity: symbol, unit, label, equation and meaning.
 
     Attributes
     ----------

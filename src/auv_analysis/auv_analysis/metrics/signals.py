@@ -18,7 +18,7 @@ ERROR, LUMPED, TAU, DELTA_XI, DELTA_PI, ENERGY, SETPOINT = range(len(NAMES))
 
 
 class Maps(NamedTuple):
-    """What leads from nu and tau to the signals: flat, row-major."""
+    """Matrices from nu and tau to the signals: flat, row-major."""
 
     Upsilon: np.ndarray
     Upsilon_inv: np.ndarray

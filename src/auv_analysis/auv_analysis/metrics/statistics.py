@@ -11,7 +11,7 @@ from auv_analysis.runs.run import Windows
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """What is kept of consecutive samples of signals, (k,) each but for count and times.
+    """Statistics of consecutive samples of signals, (k,) each but for count and times.
 
     Attributes
     ----------

@@ -173,7 +173,7 @@ class RosDriverClient(Participant):
 
     @property
     def buffer(self) -> OdometryBuffer:
-        """What has been heard so far."""
+        """Messages heard so far."""
         return self._node.buffer
 
     def listen(self, seconds: float) -> None:
@@ -227,7 +227,7 @@ class RosDriverClient(Participant):
         )
 
     def log(self, began_ns: int) -> OdometryLog:
-        """What was heard since a time, up to now."""
+        """Messages heard since a time, up to now."""
         return self._node.buffer.log(began_ns, time.time_ns())
 
     def others(self) -> list[str]:
@@ -253,7 +253,7 @@ class RosDriverClient(Participant):
         return time.time_ns()
 
     def now_ns(self) -> int:
-        """What the clock of this machine shows, ns."""
+        """Time of this machine's clock, ns."""
         return time.time_ns()
 
     def retire(self) -> None:

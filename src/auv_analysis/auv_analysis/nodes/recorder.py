@@ -44,7 +44,7 @@ Entry = tuple[str, str, bytes, dict[str, Any]]  # topic, type, message, what is 
 
 @dataclass(frozen=True)
 class Wanted:
-    """Which topics are recorded beside those of the graph.
+    """Choice of topics recorded beside those of the graph.
 
     Attributes
     ----------
@@ -216,7 +216,7 @@ class GraphClock:
         self.early.append(entry)
 
     def released(self, *, ends: bool = False) -> list[Entry]:
-        """What has waited, once the time is known; it is not waited for without bounds."""
+        """Messages that have waited, once the time is known; the wait is bounded."""
         late = time.monotonic() - self._since > EARLY_TIME
         size = sum(len(message) for _, _, message, _ in self.early)
         if ends or late or len(self.early) > EARLY_COUNT or size > EARLY_SIZE:

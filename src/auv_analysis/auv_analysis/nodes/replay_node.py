@@ -179,7 +179,7 @@ class Player:
         return found
 
     def waits_for(self) -> str:
-        """Which of the expected subscribers are missing, or an empty text."""
+        """Expected subscribers that are missing, or an empty text."""
         for topic, count in self._plan.expected.items():
             publisher = self._publishers[topic]
             found = publisher.get_subscription_count()
@@ -319,7 +319,7 @@ class ReplayNode(BulkNode):
         steady_timer(self, LOOK, self._look)
 
     def remarks(self) -> list[str]:
-        """What is odd about the bag, and what of it is not played."""
+        """Notes on the bag, and the parts that are not played."""
         p = self.plan
         longest = sorted(p.gaps, key=lambda gap: gap[0] - gap[1])[:SHOWN]
         then = 'jumped over' if p.settings.skip_gaps else '--skip-gaps jumps over it'

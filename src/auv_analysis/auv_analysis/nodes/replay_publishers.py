@@ -380,7 +380,7 @@ class Answers:
         return self._asked is None
 
     def overdue(self) -> str:
-        """What has been waited for too long, or an empty text."""
+        """The subscriber or answer that is overdue, or an empty text."""
         if self._asked is None or time.monotonic() - self._since < PATIENCE:
             return ''
         seconds = self._asked / NANOSECONDS

@@ -1,1 +1,1 @@
-"""What commands leave and show: results folders, new files, progress on a terminal."""
+"""Output of commands: results folders, new files, progress on a terminal."""

@@ -57,7 +57,7 @@ def sha256_of(path: Path) -> str:
 
 
 def signature(path: Path) -> Signature:
-    """What shows, without reading it, that a file is still the same."""
+    """Fingerprint of a file, taken without reading it."""
     found = path.lstat()
     return found.st_ino, found.st_size, found.st_mtime_ns
 

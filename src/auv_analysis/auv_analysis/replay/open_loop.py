@@ -133,7 +133,7 @@ Progress = Callable[[int], None]
 
 @dataclass(frozen=True, eq=False)
 class RecordedLoop:
-    """What a controller was told, and what it said to it.
+    """Inputs of a controller, and its answers.
 
     Attributes
     ----------
@@ -183,7 +183,7 @@ class OpenLoop:
 def recorded_loop(
     bag: str | Path, vehicle: str | Path | None = None, namespace: str | None = None
 ) -> RecordedLoop:
-    """What the controller of a bag was told and said.
+    """Inputs and answers of the controller of a bag.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def open_loop(
     gains: Mapping[str, Any],
     progress: Progress = lambda _: None,
 ) -> OpenLoop:
-    """What a law would have commanded.
+    """The wrench that a law would have commanded.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ Span = tuple[int, int]  # ns, first and last log time
 
 @dataclass(frozen=True)
 class PlayedTopic:
-    """How a topic was recorded.
+    """Recording of a topic.
 
     Attributes
     ----------

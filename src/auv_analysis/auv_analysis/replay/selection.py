@@ -86,7 +86,7 @@ class Selection:
         return [why for why in dict.fromkeys(self.left_out.values()) if why != UNWANTED]
 
     def remarks(self) -> list[str]:
-        """What is left out, a line per reason."""
+        """Messages that are left out, a line per reason."""
         listed = {why: [t for t, w in self.left_out.items() if w == why] for why in self.reasons()}
         return [f'left out: {", ".join(topics)}: {why}' for why, topics in listed.items()]
 

@@ -89,7 +89,7 @@ def fault_overview(found: Found) -> Iterator[Sentence]:
 
 
 def _rise(response: FaultResponse) -> float:
-    """How much the error grows, in settling bands."""
+    """Growth of the error, in settling bands."""
     before, during, _ = response.rms
     return ((during or 0.0) - (before or 0.0)) / response.band
 

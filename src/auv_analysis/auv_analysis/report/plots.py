@@ -306,7 +306,7 @@ def shade(axes: Axes, run: RunDigest) -> None:
 
 
 def shade_sentence(run: RunDigest) -> str:
-    """What the spans that `shade` draws are, to be added to a caption."""
+    """Legend of the spans that `shade` draws, to be added to a caption."""
     listed = '; '.join(f'{mark.number} {mark.label}, {mark.times}' for mark in run.faults)
     text = ' Grey spans: no samples.' if run.gaps else ''
     return f'{text} Shaded: {listed}.' if listed else text

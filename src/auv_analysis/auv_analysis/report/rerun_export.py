@@ -92,7 +92,7 @@ def _numbers(colour: str) -> list[int]:
 
 
 def _name(recording: 'rerun.RecordingStream', run: Run) -> None:
-    """What does not change with time: axes, colours, names and widths of lines."""
+    """Static parts: axes, colours, names and widths of lines."""
     rr = library()
     recording.log(TRAJECTORY, rr.ViewCoordinates.FRD, static=True)  # as NED: x north, z down
     width = 2.0 if run.law == 'gvc' else 1.0

@@ -29,7 +29,7 @@ KINDS = {'good': 'green', 'bad': 'red', 'zero': 'dim'}  # of a cell, and its loo
 
 @dataclass(frozen=True)
 class Column:
-    """What a column holds, and how its cells are shown.
+    """Contents of a column, and the display of its cells.
 
     Attributes
     ----------
@@ -258,7 +258,7 @@ def spelled(value: Any) -> str:
 
 @dataclass
 class Results:
-    """What a command or a study found.
+    """Findings of a command or a study.
 
     Attributes
     ----------

@@ -129,7 +129,7 @@ def six_signals(signal: str, run: RunDigest, zeros: Sequence[str] = ()) -> Drawn
 
 
 def structure_sentence(kind: str, zeros: Sequence[str]) -> str:
-    """What the structure of M makes vanish, in words."""
+    """Terms that vanish by the structure of M, in words."""
     if not zeros:
         return ''
     if len(zeros) == 6:
@@ -264,7 +264,7 @@ def common_bands(runs: Mapping[str, RunDigest]) -> list[float | None]:
 
 
 def left_out(bands: Sequence[float | None]) -> str:
-    """What a caption says of bands that are not drawn."""
+    """Words of a caption on bands that are not drawn."""
     return '; not drawn where the set-points of the runs differ' if None in bands else ''
 
 

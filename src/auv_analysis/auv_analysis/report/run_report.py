@@ -123,7 +123,7 @@ def _listings(runs: Mapping[str, RunDigest], what: str, texts: Texts) -> list[tu
 
 @dataclass(frozen=True)
 class SectionInputs:
-    """What the sections are made of.
+    """Data of the sections.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ class SectionInputs:
         yield prose('position', ends=ends, ends_apart=_apart(self.runs))
 
     def _shared(self) -> tuple[list[str], list[str]]:
-        """What all runs have in common, and in what they are known to differ."""
+        """Common settings of all runs, and their known differences."""
         runs = list(self.runs.values())
         if len(runs) < 2:
             return [], []
@@ -314,7 +314,7 @@ def findings(runs: Mapping[str, RunDigest], summaries: Summaries) -> list[Senten
 
 
 def namesakes(runs: Sequence[RunDigest]) -> list[str]:
-    """What has to be said of runs whose scenarios have one name and other set-points."""
+    """Note on runs whose scenarios have one name and other set-points."""
     groups: dict[str, list[RunDigest]] = {}
     for run in runs:
         groups.setdefault(run.scenario, []).append(run)
@@ -374,7 +374,7 @@ def _reached(
 
 
 def _applied(runs: Mapping[str, RunDigest]) -> str:
-    """What the actuators left of the commands, of the runs that have any."""
+    """Effect of the actuators on the commands, for runs that have any."""
     parts = []
     for name, run in runs.items():
         if run.acting:

@@ -117,7 +117,7 @@ def _of_the_runs(runs: Mapping[str, RunInfo]) -> list[tuple[str, list[str]]]:
 def _shared(
     runs: Mapping[str, RunInfo], summaries: Mapping[str, Any], integrator: str = ''
 ) -> list[tuple[str, list[str]]]:
-    """How the law is run, and what is odd about it."""
+    """Sampling of the law, and warnings."""
     words = {
         'zoh': 'the law is sampled once per step and its wrench held, as on a computer',
         'continuous': 'the law is evaluated in every stage of the integrator, as in the paper',

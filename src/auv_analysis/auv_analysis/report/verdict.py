@@ -75,7 +75,7 @@ def _errors(summary: Summary) -> np.ndarray | None:
 
 
 def _differing(runs: Sequence[RunDigest]) -> list[str]:
-    """What the runs would need in common and do not have; where they start counts for nothing."""
+    """Preconditions of a comparison that the runs do not share; where they start is none."""
     first, *others = runs
     begin, length = first.begin, first.duration
     depends = any(kind in OF_THE_MOTION for run in runs for kind in run.kinds or ())

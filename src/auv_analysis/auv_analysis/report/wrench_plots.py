@@ -291,7 +291,7 @@ ABOUT = {
 
 
 def estimate_finding(name: str, summary: Mapping[str, Any]) -> str:
-    """How large the unexplained or required wrench is, in a sentence; '' where not known."""
+    """Sentence on the size of the unexplained or required wrench; '' where not known."""
     kind = 'unexplained' if summary['unexplained'] else 'required_wrench'
     found = summary[kind]
     if found is None:

@@ -62,10 +62,10 @@ class RunInfo(ABC):
     @property
     @abstractmethod
     def extent(self) -> 'Extent':
-        """How long the run is, and which of the signals are there that not every run has."""
+        """Length of the run, and the optional signals that it has."""
 
     def __repr__(self) -> str:
-        """What it is a run of, in a line."""
+        """Description of the run, in a line."""
         known = self.extent
         return (
             f'<{type(self).__name__} {self.scenario}, {self.controller}: law {self.law}, vehicle '

@@ -183,7 +183,7 @@ class Scenario:
         return make_gains(self.controller(name)['law'], self.gain_values(name))
 
     def reach(self, name: str) -> AttainableWrench:
-        """What one controller knows of the actuators, for its anti-windup."""
+        """A controller's knowledge of the actuators, for its anti-windup."""
         if self.controller(name).get('anti_windup', True):
             return self.actuators.reach
         return make_reach(None, None)
@@ -196,7 +196,7 @@ class Scenario:
 
     @cached_property
     def uncertainty(self) -> Uncertainty:
-        """What acts on the plant besides the wrench."""
+        """Disturbances and model errors of the plant."""
         specs = self.data['disturbance']
         places = [f'disturbance[{i}]' for i in range(len(specs))]
         return make_uncertainty(self.vehicle, specs, self.path, places)
@@ -214,7 +214,7 @@ class Scenario:
 
     @cached_property
     def warnings(self) -> list[str]:
-        """What is odd but usable, of the vehicle and of gains for this step, one line each."""
+        """Warnings on the vehicle and on gains for this step, one line each."""
         found = list(self.vehicle.warnings)
         angles = self.data['initial']['eta'][3:5]
         if max(map(abs, angles)) > 2 * math.pi:
@@ -242,7 +242,7 @@ class Scenario:
 
     @cached_property
     def faults(self) -> Faults:
-        """What fails of sensors, actuators and links."""
+        """Faults of sensors, actuators and links."""
         specs, step = self.data.get('faults', []), self.data['step']
         allocated = self.data.get('actuators', {}).get('thrusters', False)
         vehicle, thrusters = self.vehicle, self.vehicle.thrusters

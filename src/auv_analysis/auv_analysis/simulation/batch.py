@@ -191,7 +191,7 @@ def _chosen(batch: Batch, candidates: Sequence[Kernel]) -> Kernel:
 
 
 def _why(error: Exception) -> str:
-    """What the innermost error of numba says, and where it met it, in one line."""
+    """The innermost error of numba with its place, in one line."""
     lines = [line.strip() for line in f'{type(error).__name__}: {error}'.splitlines()]
     last = max((i for i, line in enumerate(lines) if NESTED.match(line)), default=0)
     said = lines[last : last + 2] if 'Failed in' in lines[last] else lines[last : last + 1]

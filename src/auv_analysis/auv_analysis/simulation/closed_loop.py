@@ -32,7 +32,7 @@ from auv_gvc_controller.laws.model import ControlModel
 
 
 class Sample(NamedTuple):
-    """What is known at one sample: lanes or floats, six each but for the arrays.
+    """Inputs at one sample: lanes or floats, six each but for the arrays.
 
     Attributes
     ----------
@@ -178,7 +178,7 @@ class StepBlock(NamedTuple):
 
 
 class Tables(NamedTuple):
-    """What is known of these steps before they are taken, on the grid of steps and stages.
+    """Inputs of these steps, known before they are taken, on the grid of steps and stages.
 
     Attributes
     ----------
@@ -198,7 +198,7 @@ class Tables(NamedTuple):
 
 
 class LoopState(NamedTuple):
-    """What goes on from one block of steps to the next.
+    """State carried from one block of steps to the next.
 
     Attributes
     ----------

@@ -58,7 +58,7 @@ class Segment(NamedTuple):
 
 
 class OpenState(NamedTuple):
-    """What goes on from step to step: x (13,), applied wrench (6,)."""
+    """State carried from step to step: x (13,), applied wrench (6,)."""
 
     x: np.ndarray
     applied: np.ndarray
@@ -73,7 +73,7 @@ class Work(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """What all variants and segments have in common.
+    """Inputs shared by all variants and segments.
 
     Attributes
     ----------

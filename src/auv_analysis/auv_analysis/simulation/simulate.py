@@ -101,7 +101,7 @@ def check_hold(scenario: Scenario, hold: Hold) -> None:
 
 
 def blocks(scenario: Scenario) -> Iterator[tuple[StepBlock, Tables]]:
-    """What is known of a run before it starts, a block of steps at a time."""
+    """Inputs of a run that are known before it starts, a block of steps at a time."""
     tableau, count = TABLEAUS[scenario.data['integrator']], scenario.steps + 1
     noise, faults = scenario.noise(), scenario.fault_rows()
     for first in range(0, count, BLOCK):

@@ -156,7 +156,7 @@ class Variants:
 
     @property
     def structure(self) -> tuple[Any, ...]:
-        """What closed loops must have in common to run in one batch."""
+        """Properties that closed loops must share to run in one batch."""
         scenario, loop = self.scenarios[0], self.loop
         sizes = tuple(np.shape(array)[1:] for array in arrays(loop))
         common = loop.truth.exact, loop.actuators.delay, loop.guard.integrals, loop.faults

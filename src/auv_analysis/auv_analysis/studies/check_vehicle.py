@@ -215,7 +215,7 @@ def _thrusters(thrusters: Thrusters) -> dict[str, Any]:
 
 
 def _rotor(rotor: Rotor) -> dict[str, Any]:
-    """What turns a thruster, None for what does not exist; N, V, s, rad/s."""
+    """Drive of a thruster, None for what does not exist; N, V, s, rad/s."""
     curve = rotor.curve
     return {
         'curve': 'square law' if curve is None else curve.name or 'table of the file',

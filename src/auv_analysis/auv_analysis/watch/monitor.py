@@ -324,7 +324,7 @@ SILENT = 3.0  # s without a message of a topic that is published every step
 
 
 class GraphMonitor:
-    """What is known of one graph; all times are steady, in s.
+    """State of one graph; all times are steady, in s.
 
     Parameters
     ----------

@@ -99,7 +99,7 @@ def heading(snapshot: Snapshot) -> str:
 
 
 def footnote(snapshot: Snapshot) -> str:
-    """What the numbers are."""
+    """Legend of the numbers."""
     errors, parts = snapshot.velocity_error, []
     if snapshot.kinetic_energy is not None:
         parts.append(f'kinetic energy {short(snapshot.kinetic_energy.total)} J')
@@ -220,7 +220,7 @@ def _health(node: NodeState, *, facts: bool) -> Text:
 
 
 def alert_lines(alerts: Sequence[Alert], width: int, most: int | None = None) -> list[Text]:
-    """What is wrong, the worst first, in lines of so many columns; `most` lines at most."""
+    """Problems, the worst first, wrapped to a width in columns; `most` lines at most."""
     lines = []
     for alert in alerts:
         seen = [f'{alert.count} times'] if alert.count > 1 else []
@@ -271,7 +271,7 @@ def stamp(value: float) -> str:
 
 
 def fact(value: str) -> str:
-    """What a node says of itself; a number with three digits."""
+    """A node's own diagnostics; numbers with three digits."""
     try:
         return value if value.lstrip('-').isdecimal() else f'{float(value):.3g}'
     except ValueError:

@@ -12,7 +12,7 @@ LEVELS = ('ok', 'warning', 'error', 'stale')  # of diagnostic_msgs/DiagnosticSta
 
 @dataclass(frozen=True)
 class TopicState:
-    """How a topic's messages come in.
+    """Reception of a topic's messages.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class TopicState:
 
 @dataclass(frozen=True)
 class NodeState:
-    """What a node says of its health on `/diagnostics`: level, text, s since then, its facts."""
+    """Health of a node by `/diagnostics`: level, text, s since then, its facts."""
 
     name: str
     level: str

@@ -38,7 +38,7 @@ class InputError(ValueError):
 
 
 def reason(error: OSError) -> str:
-    """What the system said, as a few words for a message."""
+    """The system's reason for an error, as a few words for a message."""
     return (error.strerror or str(error)).lower()
 
 
@@ -52,7 +52,7 @@ def refusing(file: object, key: str, expected: str) -> Iterator[None]:
 
 
 def first_line(error: BaseException) -> str:
-    """What a library said of an error, as one line; its type where it said nothing."""
+    """A library's error as one line; its type where it said nothing."""
     return (str(error) or type(error).__name__).splitlines()[0]
 
 

@@ -32,6 +32,6 @@ def meant(name: object, known: Iterable[str]) -> str:
 
 
 def one_of(name: object, known: Iterable[str]) -> str:
-    """What an error expects in the place of a name that is not known: `one of a, b`."""
+    """Expectation in an error on an unknown name: `one of a, b`."""
     known = list(known)
     return f'one of {", ".join(known)}{meant(name, known)}'

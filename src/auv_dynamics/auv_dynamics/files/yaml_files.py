@@ -109,7 +109,7 @@ def parse_yaml(text: str, path: object, kind: str) -> dict[str, Any]:
 
 
 def parse_any_yaml(text: str, path: object) -> Any:
-    """What a YAML text holds; InputError, which names `path`, when it is none or too large."""
+    """Contents of a YAML text; InputError, which names `path`, when it is none or too large."""
     if len(text) > LONGEST_TEXT:
         found = f'{len(text)} characters'
         raise InputError(path, '', f'YAML of at most {LONGEST_TEXT} characters', found)

@@ -1,1 +1,1 @@
-"""What the water really does: uncertainty, current, actuators, sensors, faults, the plant."""
+"""The plant: uncertainty, current, actuators, sensors and faults."""

@@ -148,7 +148,7 @@ def fill_heard(fault: np.ndarray, tau: Vector, held: np.ndarray) -> Six:
 
 @helper
 def left_of_axes(fault: np.ndarray, c: Vector) -> Six:
-    """What the faults of whole axes leave of a wrench."""
+    """Wrench that remains under faults of whole axes."""
     return (
         fault[AXES] * c[0] + fault[AXES + 6],
         fault[AXES + 1] * c[1] + fault[AXES + 7],

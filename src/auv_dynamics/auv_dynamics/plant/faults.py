@@ -26,7 +26,7 @@ END = 1 << 62  # step at which what has no end ends
 
 
 class FaultShape(NamedTuple):
-    """What the kernel must know before it starts.
+    """Inputs of the kernel, computed before it starts.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Faults:
 
     @property
     def shape(self) -> FaultShape:
-        """What the kernel must know."""
+        """Inputs of the kernel."""
         delays = [self.delay_of(fault) for fault in self.of('sensor_delay')]
         return FaultShape(bool(self.entries), max(delays, default=0))
 
@@ -116,7 +116,7 @@ NONE = Faults((), 1.0, ())
 
 
 class FaultSetting(NamedTuple):
-    """What faults are checked against.
+    """Setting that faults are checked against.
 
     Attributes
     ----------
@@ -242,7 +242,7 @@ def _check_apart(fault: Fault, other: Fault, place: str, where: str, setting: Fa
 
 
 class Losses:
-    """Which messages a fault loses, step by step.
+    """Messages lost by a fault, step by step.
 
     One uniform number is drawn per step, also outside the fault's interval, so that what is lost
     later does not depend on where it begins.
@@ -270,7 +270,7 @@ class Losses:
 
 
 class MeasurementFaults:
-    """What `sensor_bias` and `sensor_drop_out` do to the measurements of a run."""
+    """Effect of `sensor_bias` and `sensor_drop_out` on the measurements of a run."""
 
     def __init__(self, faults: Faults, seed: int):
         self._biases = faults.of('sensor_bias')

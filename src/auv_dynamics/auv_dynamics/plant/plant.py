@@ -239,7 +239,7 @@ class Plant:
         return None if self._fault_rows is None else self._faults[self._row]
 
     def _tabulate(self) -> None:
-        """What is known of the next block of steps."""
+        """Inputs of the next block of steps."""
         self._first = self.k
         times = stage_times(self._tableau, self._step, self.k, BLOCK)
         self._F, self._current = self._uncertainty.tables(times)

@@ -26,7 +26,7 @@ PER_ROW = 3  # rotors whose speed and its rate fill a row of six of the actuator
 
 
 class Rotors(NamedTuple):
-    """What n thrusters make of the thrusts that they are asked for.
+    """Response of n thrusters to commanded thrusts.
 
     Attributes
     ----------

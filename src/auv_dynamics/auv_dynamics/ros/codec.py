@@ -30,7 +30,7 @@ UNUSED = 16  # bytes: fewer than these behind the last number are the middleware
 
 
 class Kind(NamedTuple):
-    """How messages of a type are made, read and checked; `size` numbers each, `words` in all."""
+    """Codec of a message type: made, read and checked; `size` numbers each, `words` in all."""
 
     size: int
     make: Callable[[int, Any, Frames], Any]

@@ -79,7 +79,7 @@ def acts(endpoint: Any) -> bool:
 
 
 def crowds(node: Node, topics: Iterable[Topic]) -> list[str]:
-    """Which of some topics that are for one publisher have more of them, and whose they are."""
+    """Topics with several publishers although they are for one, and the publishers' names."""
     found = []
     for topic in sorted(topics, key=lambda one: one.name):
         name, kind = node.resolve_topic_name(topic.name), type_name(topic.type)

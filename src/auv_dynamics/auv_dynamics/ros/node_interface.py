@@ -56,7 +56,7 @@ Health = tuple[bytes, str]  # level of a DiagnosticStatus, and why it is not OK
 
 
 def kind_of(text: str) -> str:
-    """What reports of the same kind have in common."""
+    """Key shared by reports of the same kind."""
     return NUMBER.split(text, maxsplit=1)[0]
 
 
@@ -113,7 +113,7 @@ def steady_timer(node: Node, period: float, callback: Callable[[], None]) -> Tim
 
 
 class NodeInterface:
-    """What every node of the graph has in common.
+    """Interface shared by every node of the graph.
 
     Declares `lockstep`, `odom_frame`, `base_frame` and `expected_subscribers`, offers `~/ready`,
     publishes `/diagnostics` and reports what is refused.
@@ -282,7 +282,7 @@ class NodeInterface:
         self.trouble = ''
 
     def _crowd(self) -> Health:
-        """Which of the topics with a single publisher has more of them, and whose they are."""
+        """Topics for a single publisher that have more of them, and the publishers' names."""
         clock = {CLOCK} if self.node.get_parameter('use_sim_time').value else set()
         return ERROR, '; '.join(crowds(self.node, self._single | clock))
 

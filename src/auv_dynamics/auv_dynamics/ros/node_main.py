@@ -36,7 +36,7 @@ NAP = 0.005  # s between two looks at an observer's data
 
 
 class BulkMixin:
-    """What a node needs to run as a process, and in a data path; stands before `Node`.
+    """Mixin of a node that runs as a process, and in a data path; stands before `Node`.
 
     By itself it is an ordinary node: any executor serves its subscriptions. `DataPath` takes them
     over in lock-step. The data of a `latency_critical` node is waited for there. At other nodes one
@@ -333,7 +333,7 @@ def _tear_down(nodes: list[Any], code: int) -> None:
 
 
 class _Event(ctypes.Structure):
-    """What a timer of POSIX does: `struct sigevent`."""
+    """Notification of a POSIX timer: `struct sigevent`."""
 
     _fields_ = (
         *(('value', ctypes.c_void_p), ('signal', ctypes.c_int), ('how', ctypes.c_int)),

@@ -125,7 +125,7 @@ def entries(group: str, specs: list[Spec]) -> dict[str, Spec]:
 
 @dataclass(frozen=True)
 class GraphSettings:
-    """What the nodes of a graph have in common."""
+    """Settings shared by the nodes of a graph."""
 
     lockstep: bool = setting(
         False, 'each step waits for its wrench, all nodes alike; else real time'

@@ -103,7 +103,7 @@ def swap_attitude(q: np.ndarray) -> np.ndarray:
 
 
 def swap_state(x: np.ndarray) -> np.ndarray:
-    """What an odometry holds: position, attitude and body velocity, its own inverse.
+    """Odometry from one frame to the other: position, attitude and body velocity; its own inverse.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ BEYOND = 0.02  # of the thrust at the end of a curve: how far a limit may be bey
 
 @dataclass(frozen=True)
 class Rotor:
-    """What turns a thruster, steady and in time; by default it delivers each thrust at once.
+    """Drive of a thruster, steady and in time; by default it delivers each thrust at once.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Rotor:
 
 @dataclass(frozen=True, eq=False)
 class Thrusters:
-    """What n thrusters can do, body frame forward-starboard-down, SI units.
+    """Geometry and limits of n thrusters, body frame forward-starboard-down, SI units.
 
     Attributes
     ----------
@@ -357,7 +357,7 @@ def column(reach: AttainableWrench, i: int, u: Number) -> Six:
 
 @helper
 def left_of(left: np.ndarray | None, i: int, n: int, u: Number) -> Number:
-    """What is left of the thrust u of thruster i of n; `left` as of `delivered`.
+    """Delivered part of the thrust u of thruster i of n; `left` as of `delivered`.
 
     The branch is none when compiled, as without lift.
     """
@@ -387,7 +387,7 @@ def delivered(
 
 @helper
 def demanded(reach: AttainableWrench, tau: Numbers) -> Numbers:
-    """What the command asks of the actuators: T T^+ tau, had the thrusters no limits.
+    """Wrench demanded of the actuators: T T^+ tau, had the thrusters no limits.
 
     A degree of freedom without a wrench of its own keeps its command: it is never delivered.
     """

@@ -93,7 +93,7 @@ class OutputStage:
 
 @dataclass(frozen=True)
 class Answer:
-    """What the controller says to an odometry: wrench and estimate, and why it lets go."""
+    """The controller's answer to an odometry: wrench and estimate, and why it lets go."""
 
     ns: int
     tau: tuple[float, ...]
@@ -230,7 +230,7 @@ class VelocityController:
         return Answer(ns, self._output.follow(tau, self._clock(ns, now)), f)
 
     def watch(self, now: Now) -> Answer | None:
-        """What has to be said without a new odometry: real time, to be asked again and again."""
+        """Wrench due without a new odometry, in real time; to be called periodically."""
         late = self._timeouts
         if late is None or self._heard is None:
             return None

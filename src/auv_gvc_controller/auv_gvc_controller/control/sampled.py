@@ -93,7 +93,7 @@ def user_law(gains: Any) -> Iterator[None]:
 
 
 class AntiWindup(NamedTuple):
-    """What stops a law's integrals.
+    """Anti-windup of a law's integrals.
 
     Attributes
     ----------

@@ -134,7 +134,7 @@ class ControllerSettings:
                 if value != getattr(other, entry.name)}  # fmt: skip
 
     def setpoints(self) -> SetpointBuffer:
-        """What keeps set-points until their odometry comes."""
+        """Buffer that keeps set-points until their odometry comes."""
         return SetpointBuffer(self.exact, self.setpoint_acceleration, *self.believed)
 
     @property

@@ -391,7 +391,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
             self.get_logger().info(f'lets go: {trouble}' if trouble else 'takes over')
 
     def _trouble(self) -> Health:
-        """What is wrong for as long as it lasts."""
+        """The present problem, for as long as it lasts."""
         if not self._active:
             return OK, ''
         return self._idle.health(self._controller.watchdog, self._controller.newest)
@@ -405,7 +405,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         self.graph.facts.update(self._health())
 
     def _health(self) -> dict[str, Any]:
-        """What the diagnostics say of the controller."""
+        """Entries of the controller in the diagnostics."""
         if not self._active:
             return {'active': False}
         c = self._controller

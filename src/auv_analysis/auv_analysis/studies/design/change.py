@@ -216,7 +216,7 @@ def disc_added_mass(
 
 
 def disc_drag(radius: np.ndarray, r: np.ndarray, normal: np.ndarray, density: float) -> np.ndarray:
-    """What thin discs add to the diagonal of the quadratic damping, (..., 6).
+    """Contribution of thin discs to the diagonal of the quadratic damping, (..., 6).
 
     Exact for a motion in one degree of freedom alone. The products of two velocities, which the
     format of a vehicle file has no place for, are left out; it dissipates for every motion.
@@ -228,7 +228,7 @@ def disc_drag(radius: np.ndarray, r: np.ndarray, normal: np.ndarray, density: fl
 
 
 class ChangeEffect(NamedTuple):
-    """What a change adds to a vehicle; any number of leading axes.
+    """Additions of a change to a vehicle; any number of leading axes.
 
     Attributes
     ----------
@@ -297,7 +297,7 @@ class ChangeSpace:
         return np.clip(np.zeros(len(NAMES)), *self.bounds)
 
     def effect(self, x: np.ndarray) -> ChangeEffect:
-        """What the values of the parameters add to the vehicle.
+        """Additions to the vehicle by values of the parameters.
 
         The ballast is trimmed: foam at its place carries its weight, so that W - B and
         W r_G - B r_B stay as they are. The disc is thin and as heavy as the water it displaces.
@@ -319,7 +319,7 @@ class ChangeSpace:
         )
 
     def hydrostatic_penalty(self, x: np.ndarray) -> np.ndarray:
-        """How much worse the vehicle is at rest: (..., 13) to (...).
+        """Penalty on the vehicle at rest: (..., 13) to (...).
 
         What turns it from level, squared, in proportion to what rights it, and the loss of what
         rights it, likewise; negative where it is nearer to level than before.
@@ -335,7 +335,7 @@ class ChangeSpace:
         return turns + lost**2
 
     def size(self, x: np.ndarray) -> np.ndarray:
-        """How large a change is: 0 none, 1 for each part that is at its bound; (..., 13) to (...).
+        """Size of a change: 0 none, 1 for each part that is at its bound; (..., 13) to (...).
 
         The centre of gravity counts by its distance from where it was, the ballast by its mass,
         the disc by its added mass; a little also how far from the middle they are placed, so that

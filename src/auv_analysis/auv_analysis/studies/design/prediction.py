@@ -31,7 +31,7 @@ REST = 1e-12  # a share below this is rounding
 
 
 class Sizes(NamedTuple):
-    """How large the couplings and the effort of a run are.
+    """Couplings and effort of a run.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Sizes(NamedTuple):
 
     @property
     def by_effort(self) -> float:
-        """What an effort is divided by: inf, so that it does not count, where there was none."""
+        """Divisor of an effort: inf, so that it does not count, where there was none."""
         return self.effort if self.effort > 0 else np.inf
 
 
@@ -175,7 +175,7 @@ class RecordedMotion:
 def added_wrench(
     change: ChangeEffect, nu: np.ndarray, nu_dot: np.ndarray, down: np.ndarray
 ) -> np.ndarray:
-    """What an effect adds to tau in the same motion, (1).
+    """Contribution of an effect to tau in the same motion, (1).
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def _weights(where: np.ndarray, count: int) -> np.ndarray:
 
 
 class Metrics(NamedTuple):
-    """What a change is judged by; any number of leading axes.
+    """Objectives of a change; any number of leading axes.
 
     Attributes
     ----------
@@ -269,7 +269,7 @@ class CouplingSignals(NamedTuple):
 
 
 class Prediction:
-    """What changes of a vehicle would do to its couplings if it moved as in a run.
+    """Predicted couplings of a changed vehicle that moves as in a run.
 
     Parameters
     ----------

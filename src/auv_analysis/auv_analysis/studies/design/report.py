@@ -199,7 +199,7 @@ def ranking_table(results: Results) -> Table:
 
 
 def matrix_table(results: Results) -> Table:
-    """What the best change of each part leaves of each coupling."""
+    """Remaining share of each coupling under the best change of each part."""
     alternatives = results.facts['alternatives']
     parts = list(dict.fromkeys(one['part'] for one in alternatives))
     rows: dict[str, dict[str, Any]] = {

@@ -238,7 +238,7 @@ def _parameters(found: Proposal, x: np.ndarray) -> list[dict[str, Any]]:
 
 
 def _at_bound(one: Parameter, value: float) -> str | None:
-    """Which bound of the search a value lies on; an angle comes round again."""
+    """Bound of the search on which a value lies; an angle is periodic."""
     if one.unit == 'deg':
         return None
     near = AT_BOUND * (one.upper - one.lower)
@@ -309,7 +309,7 @@ def nothing_statement(vehicle: str, target: str | None, there: Sequence[str]) ->
 def result_statement(
     target: int, before: float, best: Candidate | None, words: Sequence[str], by: str
 ) -> str:
-    """What the proposal does to the coupling, by simulation; `before` is its largest magnitude."""
+    """Effect of the proposal on the coupling, by simulation; `before` is its largest magnitude."""
     name, unit = COUPLINGS[target], UNITS[COUPLINGS[target]]
     if best is None or best.ratio is None:
         return f'No change within the bounds lowers {name}, which is {number(before)} {unit}, {by}.'
@@ -325,7 +325,7 @@ def result_statement(
 
 
 def warnings_of(before: Vehicle, after: Vehicle) -> list[str]:
-    """What gets worse in the vehicle at rest."""
+    """Deterioration of the vehicle at rest."""
     found = []
     stable, now = stability(before), stability(after)
     if now <= 0 < stable:
@@ -342,7 +342,7 @@ def warnings_of(before: Vehicle, after: Vehicle) -> list[str]:
 
 
 def bound_warnings(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What lies on a bound of the search; `parameters` as in design.json."""
+    """Parameters on a bound of the search; `parameters` as in design.json."""
     on = [
         f'{one["name"]} = {plain(one["value"], 4)} {one["unit"]} ({one["at_bound"]})'
         for one in parameters
@@ -354,7 +354,7 @@ def bound_warnings(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def place_warnings(space: ChangeSpace, x: np.ndarray) -> list[str]:
-    """Which parts are placed outside of the hull, as far as a vehicle file tells of it."""
+    """Parts placed outside of the hull, as far as the vehicle file gives its size."""
     axes, which = semi_axes(space.vehicle, space.data)
     found = []
     for part in (BALLAST, DISC_PART):

@@ -242,7 +242,7 @@ class Remedies:
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """What was found of a vehicle in a setting.
+    """Findings on a vehicle in a setting.
 
     Attributes
     ----------

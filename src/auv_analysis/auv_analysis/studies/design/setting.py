@@ -110,7 +110,7 @@ def _sign(data: dict[str, Any]) -> float:
 
 
 def change_words(space: ChangeSpace, x: np.ndarray) -> list[str]:
-    """What to do to the vehicle, a phrase for each part; none where nothing is changed."""
+    """Instructions for the change, a phrase for each part; none where nothing is changed."""
     phrases = {'shift': _shift, 'ballast': _ballast, 'disc': _disc}
     return [phrases[part](space, x) for part in parts_of(x)]
 
@@ -149,7 +149,7 @@ def _place(r: np.ndarray) -> str:
 
 
 def _facing(normal: np.ndarray) -> str:
-    """Which way a plate faces, whose largest part is positive: the nearest axis, how far off it."""
+    """Direction of a plate, its largest part positive: the nearest axis, and the angle to it."""
     main = int(np.argmax(normal))
     text = f'facing {WAYS[main][0]}'
     angle = float(np.arccos(min(normal[main], 1.0)))

@@ -1,1 +1,1 @@
-"""What to drive so that a model can be identified: excitations of most information, predicted."""
+"""Excitations for identification: multisines of most information, and the expected intervals."""

@@ -38,7 +38,7 @@ LONGEST = 80  # of the vehicle's name in that of the scenario
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """What an excitation must stay within.
+    """Bounds of an excitation.
 
     Attributes
     ----------

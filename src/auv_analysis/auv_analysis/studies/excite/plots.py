@@ -42,7 +42,7 @@ def draw(
 
 
 def _intervals(rows: Sequence[Mapping[str, Any]]) -> Drawn:
-    """What is left of the prior's uncertainty, coefficient by coefficient."""
+    """Posterior over prior deviation, coefficient by coefficient."""
     some = [row for row in rows if row['left'] is not None]
     figure = plots.new_figure(0.6 + 0.15 * len(some))
     axes, y = figure.subplots(), np.arange(len(some))

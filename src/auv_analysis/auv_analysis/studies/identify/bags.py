@@ -79,7 +79,7 @@ def read_records(
 
 
 def _not_acting(command: np.ndarray, acting: np.ndarray) -> Iterator[str]:
-    """What acted far less than it was commanded, beyond what a lag does; (n, 6), (m, 6)."""
+    """Axes on which far less acted than was commanded, beyond a lag's effect; (n, 6), (m, 6)."""
     asked, given = (np.quantile(np.abs(rows), USUAL, axis=0) for rows in (command, acting))
     least = np.repeat([NOTHING * asked[:3].max(), NOTHING * asked[3:].max()], 3)
     less = (asked > CLIPPED * given) & (asked > least)

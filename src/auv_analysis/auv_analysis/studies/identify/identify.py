@@ -50,7 +50,7 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Settings:
-    """How a model is identified.
+    """Settings of an identification.
 
     Attributes
     ----------

@@ -49,7 +49,7 @@ def check_rates(record: Record) -> None:
 
 
 def excitation(records: Sequence[Record]) -> list[str]:
-    """What the commands lack, a sentence each."""
+    """Deficiencies of the commands, a sentence each."""
     share = min(
         max(map(_in_one_line, (record.command, np.nan_to_num(record.evenly()))))
         for record in records

@@ -24,7 +24,7 @@ EVEN = 0.5  # of the mean interval: where all lie within, clocks jitter but no s
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """What was measured and commanded, without gaps longer than `PAUSE`.
+    """Measured motion and commands, without gaps longer than `PAUSE`.
 
     Attributes
     ----------

@@ -75,7 +75,7 @@ def _of(some: Sequence[tuple[np.ndarray, float]]) -> dict[str, float]:
 
 
 def told(rows: Sequence[Mapping[str, Any]], *, current: bool = False) -> str:
-    """What the residuals say of a model with or without a current, in a sentence."""
+    """Sentence on the residuals of a model with or without a current."""
     coloured = [row for row in rows if row['verdict'] != 'white']
     if not rows:
         return 'Whether the residuals are white cannot be told: no even rate, or too short'

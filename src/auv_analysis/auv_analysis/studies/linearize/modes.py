@@ -181,7 +181,7 @@ def print_margins(margins: Mapping[str, Mapping[str, Any]], out: Console | None 
 
 
 def disk_sentence(alpha: float) -> str:
-    """What a disk margin allows in all axes at once."""
+    """Tolerance by a disk margin in all axes at once."""
     decibel = 20 * np.log10((2 + alpha) / (2 - alpha)) if alpha < 2 else np.inf
     degrees = 2 * np.degrees(np.arctan(alpha / 2))
     return (

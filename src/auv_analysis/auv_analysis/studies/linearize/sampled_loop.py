@@ -104,7 +104,7 @@ class HeldPlant:
         return whole[:n, :n], whole[:n, n:]
 
     def input(self, delay: float) -> HeldInput:
-        """How a wrench acts that comes `delay` s late, any number from 0 up.
+        """Effect of a wrench that comes `delay` s late, any number from 0 up.
 
         Astrom & Wittenmark 1997, section 2.3.
         """

@@ -146,7 +146,7 @@ def _left_out(of: Sensitivity) -> Iterator[tuple[str, str]]:
 
 
 def sensitivity_sentences(found: Sequence[Sensitivity]) -> list[Sentence]:
-    """What the study of gains found, a few sentences for each controller."""
+    """Findings of the study of gains, a few sentences for each controller."""
     return [Sentence(text, source) for of in found for text, source in _sentences(of)]
 
 
@@ -331,7 +331,7 @@ def discussion(summaries: Mapping[str, Summary], leading: str) -> list[Sentence]
 
 
 def _pace(name: str, summary: Summary) -> Iterator[Sentence]:
-    """Which velocities converge slowly, or not at all."""
+    """Velocities that converge slowly, or not at all."""
     times = summary['velocity_error']['settling_time']
     never = [dof for dof, time in zip(DOFS, times, strict=True) if time is None]
     rest = [(time, dof) for dof, time in zip(DOFS, times, strict=True) if time]
@@ -365,7 +365,7 @@ def _energy(name: str, summary: Summary) -> Iterator[Sentence]:
 
 
 def _deformed(kind: str, summary: Summary) -> Iterator[Sentence]:
-    """Which component is deformed most, by how much of itself, and by which other."""
+    """The component that is deformed most, by how much of itself, and by which other."""
     what, cause, metric, units = DEFORMED[kind]
     largest, own = summary['coupling'][f'{kind}_max'], summary[metric]['max']
     least = ROUNDING * max(own)  # below which nothing moves by itself

@@ -111,7 +111,7 @@ SHRINKS = 4  # how often the span is tried, each time with the square root of th
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """How the KPIs of one controller follow its gains.
+    """Sensitivity of one controller's KPIs to its gains.
 
     Attributes
     ----------

@@ -65,7 +65,7 @@ def _columns(sweep: Sweep, names: Sequence[str]) -> dict[str, np.ndarray]:
 
 
 def influence(ranks: np.ndarray, codes: np.ndarray, others: np.ndarray | None) -> Row | None:
-    """How much of the order of a figure a path explains.
+    """Share of a figure's rank order that a path explains.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ SAMPLE = 600  # rows of a controller that are drawn as points
 
 @dataclass(eq=False)
 class Analysis:
-    """What was found in a sweep.
+    """Findings of a sweep.
 
     Attributes
     ----------

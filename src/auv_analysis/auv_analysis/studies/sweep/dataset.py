@@ -72,7 +72,7 @@ class Sweep:
 
     @property
     def paths(self) -> list[str]:
-        """What varies, in the order of the campaign."""
+        """Variations, in the order of the campaign."""
         return [path for spec in self.campaign['vary'] for path in spec[kind_of(spec)]]
 
     @cached_property

@@ -279,7 +279,7 @@ def sweep(
 
 
 def _why(error: Exception) -> str | None:
-    """What is said of an error that is none of the program; None for the others."""
+    """Line on an error that is none of the program; None for the others."""
     of_dask = type(error).__module__.startswith('distributed.')
     if of_dask or isinstance(error, CancelledError | BrokenExecutor):
         return f'the workers are lost ({type(error).__name__})'

@@ -69,7 +69,7 @@ def sweep_folder(out: Path, campaign: Campaign, *, overwrite: bool) -> Iterator[
 
 
 class SweepFolder:
-    """What a sweep was made of, and the blocks that are finished.
+    """Inputs of a sweep, and the blocks that are finished.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ class SweepFolder:
                 yield number, pq.ParquetFile(path).read(columns)
 
     def stored(self, rollouts: int) -> int:
-        """How many of so many rollouts lie in the folder."""
+        """Number of finished rollouts in the folder."""
         blocks = (block for block, _ in self._parts())
         return sum(min(self.block, rollouts - block * self.block) for block in blocks)
 

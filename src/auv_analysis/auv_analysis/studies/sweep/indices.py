@@ -101,7 +101,7 @@ def _designed(sweep: Sweep, groups: list[Group], number: int, spec: dict[str, An
 
 
 def _cases(sweep: Sweep, others: np.ndarray, paths: list[str], count: int) -> list[str]:
-    """What else varies, in each combination that has rows."""
+    """The other variations, in each combination that has rows."""
     beside = [path for path in sweep.paths if path not in paths]
     if not beside or count > MOST_OTHERS:
         return [''] * count
@@ -174,7 +174,7 @@ def _whole(entry: Designed, rows: np.ndarray) -> np.ndarray:
 
 
 def omitted(sweep: Sweep, entry: Designed, values: np.ndarray, measure: Measure) -> Iterator[str]:
-    """What has to be said of a measure that has no indices since some rows have no such figure."""
+    """Note on a measure without indices: some rows have no such figure."""
     for i, controller in enumerate(sweep.controllers):
         lacks = [np.isnan(values[_rows(sweep, entry, i, k)]) for k in range(len(entry.cases))]
         if any(mask.any() and not mask.all() for mask in lacks):
@@ -186,7 +186,7 @@ def omitted(sweep: Sweep, entry: Designed, values: np.ndarray, measure: Measure)
 
 
 def reached(sweep: Sweep, entry: Designed) -> Iterator[str]:
-    """What has to be said of a design of which a part has no indices, or whose rows are noisy."""
+    """Notes on a design of which a part has no indices, or whose rows are noisy."""
     paths, of = ', '.join(entry.paths), int(entry.spec['count'])
     saltelli = entry.kind == 'saltelli'
     blocks, biased = ('base points', 'S_T') if saltelli else ('trajectories', 'μ* and σ')

@@ -88,7 +88,7 @@ def _distributions(analysis: Analysis) -> Drawn:
 
 
 def _fixed(fixed: Mapping[str, float | None]) -> str:
-    """Which measures are the same in every row, or have no value."""
+    """Measures that are the same in every row, or have no value."""
     groups = {
         'Zero in every row and not drawn': [n for n, value in fixed.items() if value == 0.0],
         'The same in every row': [n for n, value in fixed.items() if value],

@@ -143,7 +143,7 @@ def make_space(
 
 
 def _scale(structure: str, M: np.ndarray, *, inertial: bool) -> tuple[np.ndarray, float, float]:
-    """What a coordinate multiplies, and by how much its bounds grow."""
+    """Matrix that a coordinate scales, and the factor of its bounds."""
     inertia, one = np.diagonal(M), np.array(1.0)
     if inertial and structure == 'scalar':
         return one, float(inertia.min()), float(inertia.max())

@@ -23,7 +23,7 @@ BELOW_ONE = ('mass', 'added_mass', 'damping', 'buoyancy', 'inertia')  # no plant
 
 @dataclass(frozen=True)
 class Spread:
-    """How far the draws go; each number is drawn uniformly within it.
+    """Ranges of the draws; each number is drawn uniformly within its own.
 
     Attributes
     ----------

@@ -184,7 +184,7 @@ def _gains(results: Results) -> Table:
 
 
 def _searched(results: Results) -> Table:
-    """What was searched, and how far."""
+    """The search and its extent."""
     rows = []
     for name, entry in results.facts['controllers'].items():
         for i, search in enumerate(entry.get('searches', [])):
@@ -284,7 +284,7 @@ def _comparisons(results: Results) -> Table:
 
 
 def _spread(results: Results) -> Table:
-    """What is drawn, and how far."""
+    """The random draws and their extent."""
     rows = [
         {
             'name': name,
@@ -301,7 +301,7 @@ def _spread(results: Results) -> Table:
 
 
 def findings(tuning: Tuning) -> Iterator[Sentence]:
-    """What a tuning found, the most important first."""
+    """Findings of a tuning, the most important first."""
     yield from _nominal(tuning)
     yield from _unreached(tuning)
     if tuning.draws:

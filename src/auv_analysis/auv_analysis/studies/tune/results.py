@@ -130,7 +130,7 @@ class Tuning:
         return float(value / base)
 
     def remarks(self, name: str) -> list[str]:
-        """What a reader of a controller's numbers must know, a phrase each."""
+        """Warnings on a controller's numbers, a phrase each."""
         found = []
         if name in self.laws:
             found += self.laws[name].remarks(self.scenario.duration)

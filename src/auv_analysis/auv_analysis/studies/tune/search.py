@@ -37,7 +37,7 @@ ROUNDING = 1e-9  # by which a rate may exceed its limit
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of a tuning.
+    """Settings of a tuning.
 
     Attributes
     ----------
@@ -173,7 +173,7 @@ class TunedLaw:
         return self.best.space.entry(self.best.x)
 
     def remarks(self, duration: float) -> list[str]:
-        """What a reader of the gains must know: bounds of the search, an adaptation without effect.
+        """Warnings on the gains: bounds of the search, an adaptation without effect.
 
         An adaptation whose slowest and fastest rates, the eigenvalues of K_D^-1 K_f, are below the
         inverse of the run's length does not act in it.

@@ -14,9 +14,9 @@ from pyarrow import parquet
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.herman2018 import paper
 from auv_analysis.herman2018.claims import ROWS, Row, claims_part, judge_runs, write_claims
-from auv_analysis.herman2018.evidence import ErrorSensitivity, Evidence, Quotes, Signals, grade
+from auv_analysis.herman2018.evidence import ErrorSensitivity, Evidence, Quotes, grade
 from auv_analysis.output.text import MISSING
-from auv_analysis.report.digest import digests
+from auv_analysis.report.digest import FOREVER, RunDigest, digests
 from auv_analysis.runs.run import Run
 from auv_dynamics import load_vehicle
 from auv_dynamics.vehicle import DOFS
@@ -324,18 +324,22 @@ Asked = tuple[str, str, tuple[float, ...]]  # law, name of a signal, window
 
 
 @dataclass(frozen=True, eq=False)
-class Scaled(Signals):
-    """Signals of a law's run, of which one is some times as large in one window."""
+class Scaled:
+    """A law's run, of which one signal is some times as large in one window."""
 
+    run: RunDigest
     law: str
     which: Asked
     times: np.ndarray
     asked: dict[Asked, Any]  # and the answer
 
-    def part(self, name: str, *window: float) -> Any:
-        key = self.law, name, window
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.run, name)
+
+    def part(self, name: str, first: float = 0.0, last: float = FOREVER) -> Any:
+        key = self.law, name, (first, last)
         if key not in self.asked:
-            found = super().part(name, *window)
+            found = self.run.part(name, first, last)
             kinds = ('peak', 'rms', 'mean', 'span', 'path', 'last')
             self.asked[key] = SimpleNamespace(**{kind: getattr(found, kind) for kind in kinds})
         if key != self.which:
@@ -356,18 +360,16 @@ class Experiment:
 
     def verdict(self, which: Asked, axis: int, factor: float) -> str:
         times = np.where((np.arange(6) == axis) | (axis == ALL), factor, 1.0)
-        signals = {
-            law: Scaled(run, law, which, times, self.asked) for law, run in self._runs.items()
-        }
+        runs = {law: Scaled(run, law, which, times, self.asked) for law, run in self._runs.items()}
         answers = {
             law: ErrorSensitivity(*(
                 ANSWERS * (times if which[:2] == (law, name) else 1.0)
                 for name in ('gains', 'others')
             ))
-            for law in signals
+            for law in runs
         }  # fmt: skip
         N = np.array(paper.N) * (times if which[1] == 'N' else 1.0)
-        return self._row.judge(Evidence(signals, tuple(N), answers), Quotes()).verdict
+        return self._row.judge(Evidence(runs, tuple(N), answers), Quotes()).verdict
 
     def flips(self, which: Asked, axis: int) -> Iterator[str]:
         """Factors from which on the verdict is another one."""
@@ -404,7 +406,7 @@ def test_what_each_row_says_of_runs_whose_every_column_is_like_no_others(approve
         law: ErrorSensitivity(np.roll(ANSWERS, k), np.roll(ANSWERS, k + 2))
         for k, law in enumerate(runs)
     }
-    evidence = Evidence({law: Signals(run) for law, run in runs.items()}, tuple(N), answers)
+    evidence = Evidence(runs, tuple(N), answers)
     for number, row in enumerate(ROWS, start=1):
         quote = Quotes()
         found = row.judge(evidence, quote)
@@ -413,10 +415,12 @@ def test_what_each_row_says_of_runs_whose_every_column_is_like_no_others(approve
 
 
 @dataclass(frozen=True, eq=False)
-class Exact(Signals):
+class Exact:
     """A run of which some numbers are given, 'signal kind begin' -> one or six; others are zero."""
 
     given: dict[str, Any]
+    duration = 30.0
+    settled = 1.0
 
     def part(self, name: str, first: float = 0.0, *_: float) -> Any:
         kinds = ('peak', 'rms', 'mean', 'span', 'path', 'last')
@@ -457,6 +461,5 @@ OTHER = {'error peak 0': [1.0, 0.005, 0, 0, 0, 0], 'error path 0': [2.0, 1.0, 2.
 )  # fmt: skip
 def test_a_number_on_the_border_counts_as_the_criterion_says(number, gvc, cl, verdict):
     """'within' and 'at most' are with the border, 'above', 'below' and 'exceeds' without it."""
-    run = SimpleNamespace(duration=30.0, settled=1.0)
-    signals = {'gvc': Exact(run, gvc), 'cl': Exact(run, cl)}
-    assert ROWS[number - 1].judge(Evidence(signals, paper.N), Quotes()).verdict == verdict
+    runs = {'gvc': Exact(gvc), 'cl': Exact(cl)}
+    assert ROWS[number - 1].judge(Evidence(runs, paper.N), Quotes()).verdict == verdict

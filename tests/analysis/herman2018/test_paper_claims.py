@@ -164,8 +164,9 @@ def test_claim_15_is_not_reproduced_without_the_coupling():
     tau = run.tau.copy()
     tau[:, 1] = 1e5  # sway: its coupling deforms roll and yaw
     other = case_evidence(load_scenario('case1'), {'gvc': replace(run, tau=tau)})
-    assert other.gvc.peak('delta_pi')[[3, 5]].max() > other.gvc.peak('delta_pi')[PITCH]
-    changed = replace(known, signals=other.signals, responses=responses(SECOND, SECOND))
+    peak = other.gvc.part('delta_pi').peak
+    assert peak[[3, 5]].max() > peak[PITCH]
+    changed = replace(known, runs=other.runs, responses=responses(SECOND, SECOND))
     assert judged({'case1': changed})[14].verdict == 'not reproduced'
     assert judged({'case1': replace(changed, responses={})})[14].verdict == 'not evaluated'
 

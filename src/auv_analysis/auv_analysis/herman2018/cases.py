@@ -6,7 +6,7 @@ from typing import Any
 
 from auv_analysis.herman2018 import paper
 from auv_analysis.herman2018.claims import judged
-from auv_analysis.herman2018.evidence import BOTH, Claim, ErrorSensitivity, Evidence, Signals
+from auv_analysis.herman2018.evidence import BOTH, Claim, ErrorSensitivity, Evidence
 from auv_analysis.herman2018.responses import response
 from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.document import Sentence
@@ -98,8 +98,7 @@ def case_evidence(
     """Evidence of one of the paper's cases, from runs at hand where they have its gains."""
     found = {law: paper.paper_run(at_hand or {}, law) for law in BOTH}
     runs = {law: run or simulate(case, law, hold) for law, run in found.items()}
-    signals = {law: Signals(run) for law, run in digests(runs).items()}
-    return Evidence(signals, tuple(control_model(case.vehicle).N.tolist()))
+    return Evidence(digests(runs), tuple(control_model(case.vehicle).N.tolist()))
 
 
 def departures_of(scenario: Scenario) -> Iterator[tuple[str, Any, Any]]:

@@ -15,7 +15,6 @@ from auv_analysis.herman2018.evidence import (
     Evidence,
     Quotes,
     Row,
-    Signals,
     Value,
     Verdict,
 )
@@ -239,9 +238,8 @@ def judge_runs(
     case = load_scenario(scenario)
     if not all(_is_case(run, case) for run in known.values()):
         return []
-    signals = {law: Signals(run) for law, run in known.items()}
     N = next(iter(summaries.values()))['decomposition']['N']
-    return judged({scenario: Evidence(signals, tuple(N))})
+    return judged({scenario: Evidence(known, tuple(N))})
 
 
 def _is_case(run: RunDigest, case: Scenario) -> bool:
@@ -289,13 +287,13 @@ def _obstacle(row: Row, case: str, evidence: Evidence | None) -> tuple[Verdict |
     if evidence is None:
         return 'other case', f'Belongs to Case {case[-1]}.'
     for law in row.laws:
-        signals = evidence.signals.get(law)
-        if signals is None:
+        run = evidence.runs.get(law)
+        if run is None:
             gains = '(40)' if (case, law) == ('case2', 'cl') else '(36), (37)'
             return 'not evaluated', f'No run of law {law} with gains {gains}.'
-        if signals.run.duration < row.seconds:
+        if run.duration < row.seconds:
             return 'not evaluated', f'Needs a run of at least {row.seconds:g} s.'
-        if row.knows_F and not signals.run.knows_disturbance:
+        if row.knows_F and not run.knows_disturbance:
             return 'not evaluated', 'F is not known for this run.'
         if row.responds and law not in evidence.responses:
             return 'not evaluated', 'Needs a study of the gains: two laws are none.'

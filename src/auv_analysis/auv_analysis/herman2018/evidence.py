@@ -1,4 +1,4 @@
-"""Evidence for a claim: signals of runs, questions to them, numbers kept beside their text."""
+"""Evidence for a claim: runs with the gains of the paper, numbers kept beside their text."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -7,10 +7,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from auv_analysis.metrics.statistics import Part
-from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.output.text import MISSING, fixed, number
-from auv_analysis.report.digest import FOREVER, RunDigest, last_third
+from auv_analysis.report.digest import FOREVER, RunDigest
 
 Text = Callable[[float], str]
 UNBOUNDED = 'unbounded'
@@ -103,33 +101,6 @@ class Judgement(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Signals:
-    """A run and what the judges ask of its signals, which are named as in `RunDigest`."""
-
-    run: RunDigest
-
-    def part(self, name: str, first: float = 0.0, last: float = FOREVER) -> Part:
-        """Statistics of a signal in [first, last], s from the start."""
-        return self.run.part(name, first, last)
-
-    def peak(self, name: str, first: float = 0.0, last: float = FOREVER) -> np.ndarray:
-        """Largest magnitudes (6,) of a signal in [first, last]."""
-        return self.part(name, first, last).peak
-
-    def late_peak(self, name: str) -> np.ndarray:
-        """Largest magnitudes (6,) after the transient."""
-        return self.peak(name, TRANSIENT)
-
-    def late_rms(self, name: str) -> np.ndarray:
-        """Root mean squares (6,) after the transient."""
-        return self.part(name, TRANSIENT).rms
-
-    def last_third(self, name: str) -> Part:
-        """Statistics of a signal in the last third of the run."""
-        return self.part(name, last_third(self.run))
-
-
-@dataclass(frozen=True, eq=False)
 class ErrorSensitivity:
     """Response of the RMS velocity errors under one law to changes.
 
@@ -151,28 +122,28 @@ class Evidence:
 
     Attributes
     ----------
-    signals : law -> signals of its run
+    runs : law -> its run
     N : (6,) of the decomposition, kg and kg m2
     responses : law -> what its errors follow; empty where nobody has looked
 
     """
 
-    signals: Mapping[str, Signals]
+    runs: Mapping[str, RunDigest]
     N: tuple[float, ...]
     responses: Mapping[str, ErrorSensitivity] = field(default_factory=dict)
 
     @property
-    def gvc(self) -> Signals:
-        """Signals of the GVC run."""
-        return self.signals['gvc']
+    def gvc(self) -> RunDigest:
+        """The GVC run."""
+        return self.runs['gvc']
 
     @property
-    def cl(self) -> Signals:
-        """Signals of the CL run."""
-        return self.signals['cl']
+    def cl(self) -> RunDigest:
+        """The CL run."""
+        return self.runs['cl']
 
     @property
-    def both(self) -> tuple[Signals, Signals]:
+    def both(self) -> tuple[RunDigest, RunDigest]:
         """GVC, then CL."""
         return self.gvc, self.cl
 

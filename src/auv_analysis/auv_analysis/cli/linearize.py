@@ -40,9 +40,10 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.output.progress import say, waiting
     from auv_analysis.scenario.scaling import plain_name
     from auv_analysis.scenario.scenario import Scenario
+    from auv_analysis.studies.linearize.linearize import linearize
     from auv_analysis.studies.linearize.margins import ControlLoop, stability_margins
     from auv_analysis.studies.linearize.modes import (
-        linear_models,
+        OPEN,
         print_margins,
         print_poles,
         results_of,
@@ -68,7 +69,9 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     eta0 = None if options.attitude is None else [0.0, 0.0, 0.0, *options.attitude]
     try:
         with waiting('linearising'):
-            models = linear_models(subject, names, options.nu0, eta0)
+            point = {'nu0': options.nu0, 'eta0': eta0}
+            models = {OPEN: linearize(subject, **point)}
+            models |= {name: linearize(subject, controller=name, **point) for name in names}
             loops = {}
             if isinstance(subject, Scenario) and _is_soon(subject, delay):
                 loops = {

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from auv_analysis import linearize, load_scenario
+from auv_analysis import linearize
 from auv_analysis.cli.main import main
-from auv_analysis.studies.linearize.modes import linear_models, stability
+from auv_analysis.studies.linearize.modes import stability
 
 
 @pytest.mark.usefixtures('unrendered')
@@ -46,12 +46,15 @@ def test_the_loops_of_a_scenario_as_a_table(tmp_path, monkeypatch, capsys, appro
     assert f'cl: 20 states, marginal, 2 of its {len(model["modes"])} modes neither grow' in text
 
 
-def test_all_models_are_of_one_point():
-    nu0, eta0 = [0.5, 0.1, -0.2, 0.01, 0.02, 0.03], [0.0, 0.0, 0.0, 0.1, -0.2, 0.3]
-    models = linear_models(load_scenario('case1'), ['cl', 'gvc'], nu0, eta0)
+@pytest.mark.usefixtures('unrendered')
+def test_all_models_are_of_one_point(tmp_path, capsys):
+    nu0, attitude = ['0.5', '0.1', '-0.2', '0.01', '0.02', '0.03'], ['0.1', '-0.2', '0.3']
+    point = ['--nu0', *nu0, '--attitude', *attitude, '--out', str(tmp_path / 'out'), '--json']
+    main(['linearize', 'case1', '--controller', 'cl', '--controller', 'gvc', *point])
+    models = json.loads(capsys.readouterr().out)['models']
     assert list(models) == ['open loop', 'cl', 'gvc']
     for model in models.values():
-        assert_allclose(model.x0[:8], [*eta0[3:5], *nu0])
+        assert_allclose(model['x0'][:8], np.array([*attitude[:2], *nu0], float))
 
 
 @pytest.mark.parametrize(('rate', 'verdict'), [(-1, 'asymptotically stable'), (1e-3, 'unstable')])

@@ -10,9 +10,7 @@ from rich.console import Console
 from auv_analysis.output.progress import TextConsole
 from auv_analysis.output.text import number, plain
 from auv_analysis.report.results import Results, Shown, described, make_table, terminal
-from auv_analysis.scenario.scenario import Scenario
-from auv_analysis.studies.linearize.linearize import Linearization, linearize, pole_text
-from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_analysis.studies.linearize.linearize import Linearization, pole_text
 
 STABLE, MARGINAL, UNSTABLE = 'asymptotically stable', 'marginal', 'unstable'
 NEGLIGIBLE = 1e-8  # of the fastest pole, below which one is zero
@@ -79,27 +77,6 @@ def _mode(
 OPEN = 'open loop'
 
 
-def linear_models(
-    subject: Vehicle | Scenario,
-    controllers: Sequence[str],
-    nu0: Sequence[float] | None,
-    eta0: Sequence[float] | None,
-) -> dict[str, Linearization]:
-    """Linear models by name: the vehicle alone, then the loop with each controller.
-
-    Parameters
-    ----------
-    subject : a vehicle, or a scenario with its controllers
-    controllers : names of some of them
-    nu0, eta0 : (6,) the point; none: at rest, level
-
-    """
-    found = {OPEN: linearize(subject, nu0, eta0=eta0)}
-    for name in controllers:
-        found[name] = linearize(subject, nu0, controller=name, eta0=eta0)
-    return found
-
-
 def results_of(
     name: str,
     models: Mapping[str, Linearization],
@@ -111,7 +88,7 @@ def results_of(
     Parameters
     ----------
     name : of the vehicle or scenario
-    models : of `linear_models`
+    models : `OPEN`, the vehicle alone, and each controller -> its linear model
     margins : controller -> what `stability_margins` gives, of those that have feedback
     left_out : keys of the scenario
 

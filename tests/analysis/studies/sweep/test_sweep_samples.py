@@ -13,9 +13,9 @@ from scipy.stats import qmc
 
 from auv_analysis.studies.sweep import variation
 from auv_analysis.studies.sweep.variation import (
+    DESIGNS,
     MOST_AT_ONCE,
     axis_values,
-    make_design,
     make_distribution,
     make_group,
 )
@@ -45,8 +45,9 @@ QUANTILES = [  # spec, what scipy.stats has for it
 ]
 
 
-def design(kind: str, count: int = 16, seed: int = SEED, number: int = 0, **more):
-    return make_design(kind, PATHS, {'count': count, **more}, seed, number)
+def design(kind: str, count: int = 16, seed: int = SEED, number: int = 0, paths=PATHS, **more):
+    stream = np.random.SeedSequence(seed, spawn_key=(0, number))
+    return DESIGNS[kind](paths, {'count': count, **more}, stream)
 
 
 def whole(kind: str, **options) -> np.ndarray:
@@ -60,7 +61,7 @@ def stream(number: int = 0) -> np.random.Generator:
 
 
 def test_random_numbers_of_many_paths_are_numbers_of_their_own() -> None:
-    made = make_design('random', list('abcdef'), {'count': 16}, SEED, 0)
+    made = design('random', paths=list('abcdef'))
     every = made.at(np.arange(16))
     assert len(np.unique(every)) == 96
     assert (made.at(np.array([9, 8])) == every[[9, 8]]).all()

@@ -193,24 +193,6 @@ class SamplingPlan(NamedTuple):
     at: Callable[[np.ndarray], np.ndarray]
 
 
-def make_design(
-    kind: str, paths: list[str], spec: dict[str, Any], seed: int, group: int
-) -> SamplingPlan:
-    """Design of a checked group of a campaign, of the k coordinates that are named.
-
-    Parameters
-    ----------
-    spec : the group's `count` and what else its kind takes
-    seed, group : root seed of the campaign and the group's number
-
-    Raises
-    ------
-    ValueError : (expected, found)
-
-    """
-    return DESIGNS[kind](paths, spec, np.random.SeedSequence(seed, spawn_key=(SAMPLES, group)))
-
-
 def _in_runs(positions: np.ndarray, draw: Callable[[int, int], np.ndarray]) -> np.ndarray:
     """Points at any positions by a function that gives `count` points from `first` on."""
     wanted, where = np.unique(positions, return_inverse=True)
@@ -397,7 +379,8 @@ def make_group(spec: Mapping[str, Any], seed: int, number: int, file: object) ->
         if kind == 'morris':
             _check_bounded(drawn, place, file)
         options = {key: int(value) for key, value in spec.items() if key != kind}  # 4.0 is 4
-        return _drawn(drawn, make_design(kind, list(drawn), options, seed, number))
+        stream = np.random.SeedSequence(seed, spawn_key=(SAMPLES, number))
+        return _drawn(drawn, DESIGNS[kind](list(drawn), options, stream))
     except InputError:
         raise
     except ValueError as error:

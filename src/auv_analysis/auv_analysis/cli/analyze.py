@@ -93,8 +93,10 @@ def _few(sources: Sequence[RunSource], options: argparse.Namespace) -> dict[str,
     pairs = [(source, entry.run) for source, entry in zip(sources, opened, strict=True)]
     names = named(pairs, join='_')
     runs = dict(zip(names, (entry.run for entry in opened), strict=True))
-    scenario_texts = dict(zip(names, (entry.scenario_text for entry in opened), strict=True))
-    vehicle_texts = dict(zip(names, (entry.vehicle_text for entry in opened), strict=True))
+    scenario_texts, vehicle_texts = (
+        {n: one.attachments.get(file, '') for n, one in zip(names, opened, strict=True)}
+        for file in ('scenario.yaml', 'vehicle.yaml')
+    )
     report = not options.no_report
     with _folder([entry.run.scenario for entry in opened], sources, options) as results:
         return conclude(results.folder, runs, scenario_texts, vehicle_texts, report=report)

@@ -142,9 +142,9 @@ def test_files_that_are_read_and_texts_of_what_was_simulated(folder: Path, resul
     (samples, *_), (scenario, *_) = sources_of(['runs/short']), sources_of(['short.yaml'])
     assert [path.name for path in samples.files] == ['gvc.npz', 'scenario.yaml', 'vehicle.yaml']
     assert [path.name for path in scenario.files] == ['short.yaml', 'herman2018.yaml']
-    found = open_source(samples)
-    assert found.scenario_text == (results / 'scenario.yaml').read_text()
-    assert found.vehicle_text == (results / 'vehicle.yaml').read_text()
+    texts = open_source(samples).attachments
+    for file in ('scenario.yaml', 'vehicle.yaml'):
+        assert texts[file] == (results / file).read_text()
 
 
 LAW = "raise RuntimeError('it was imported')"

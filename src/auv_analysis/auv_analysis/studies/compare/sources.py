@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.attachments import folder_name
@@ -13,7 +13,7 @@ from auv_analysis.bag.load import Recording, open_bag
 from auv_analysis.bag.metadata import IN_FOLDERS, files_of, is_csv, is_mcap
 from auv_analysis.bag.step_topics import NotOursError
 from auv_analysis.output.folder import SWEEP
-from auv_analysis.runs.run import Hold, Run
+from auv_analysis.runs.run import Hold
 from auv_analysis.runs.samples import ENDING, load_samples
 from auv_analysis.scenario.scenario import Scenario, load_scenario
 from auv_analysis.simulation.simulate import announce, simulate
@@ -197,16 +197,8 @@ def _simulated(scenario: Scenario) -> list[RunSource]:
 DEEPEST = 4  # folders of a path in a name
 
 
-class Opened(NamedTuple):
-    """A run and the texts of its scenario and its vehicle, '' where they are not known."""
-
-    run: Run
-    scenario_text: str
-    vehicle_text: str
-
-
-def open_source(source: RunSource, vehicle: str | None = None) -> Opened:
-    """Run of a source.
+def open_source(source: RunSource, vehicle: str | None = None) -> Recording:
+    """Run of a source, with the texts of its scenario and its vehicle where they are known.
 
     Parameters
     ----------
@@ -219,17 +211,16 @@ def open_source(source: RunSource, vehicle: str | None = None) -> Opened:
     DivergedError : it is simulated and diverges
 
     """
-    if source.scenario is None:
-        run, texts = _open_bag(source, vehicle)
+    scenario = source.scenario
+    if scenario is None:
+        return _open_bag(source, vehicle)
+    if source.kind == 'samples':
+        run = load_samples(source.path, scenario)
     else:
-        scenario, texts = source.scenario, source.scenario.attachments
-        if source.kind == 'samples':
-            run = load_samples(source.path, scenario)
-        else:
-            announce(scenario, [source.controller])
-            hold: Hold = 'zoh' if scenario.sampled else 'continuous'
-            run = simulate(scenario, source.controller, hold)
-    return Opened(run, texts.get('scenario.yaml', ''), texts.get('vehicle.yaml', ''))
+        announce(scenario, [source.controller])
+        hold: Hold = 'zoh' if scenario.sampled else 'continuous'
+        run = simulate(scenario, source.controller, hold)
+    return Recording(run, scenario.attachments)
 
 
 def _open_bag(source: RunSource, vehicle: str | None) -> Recording:

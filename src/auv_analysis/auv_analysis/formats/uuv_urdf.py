@@ -196,13 +196,14 @@ def _inertial(link: Element, model: Element, path: Path) -> tuple[dict[str, Any]
     found = link.find('inertial')
     assert found is not None
     origin, inertia = found.find('origin'), found.find('inertia')
-    point, R = pose_in_link(found, link, model, path, 'inertial')  # of SDF
-    if origin is not None:
-        xyz, rpy = (
+    if origin is None:
+        point, R = pose_in_link(found, link, model, path, 'inertial')  # of SDF
+    else:
+        point, rpy = (
             np.array(numbers(origin.get(name, '0 0 0'), 3, path, f'inertial.origin.{name}'))
             for name in ('xyz', 'rpy')
         )
-        point, R = xyz, rotation(quaternion(rpy))
+        R = rotation(quaternion(rpy))
     parts = {} if inertia is None else {str(part.tag): part.text or '' for part in inertia}
     texts = parts if inertia is None else parts | dict(inertia.attrib)
     tensor = dict(zip(ENTRIES, inertia_entries(texts, R, path, 'inertial'), strict=True))

@@ -67,7 +67,7 @@ def test_all_that_is_known_of_a_quantity_is_stored_beside_its_column() -> None:
 
 
 def test_columns_are_stored_in_the_order_in_which_they_are_shown() -> None:
-    table = make_table('t', 'All.', [{'c': 3, 'b': 2, 'a': None}], ['a', 'b'])
+    table = make_table('t', 'All.', [{'c': 3, 'b': 2, 'a': None}], {'a': 'a', 'b': 'b'})
     assert table.data.column_names == ['a', 'b', 'c']
     assert [head.numeric for head in table.columns] == [True, True], 'unknown, but numbers'
 

@@ -16,7 +16,7 @@ from pyarrow import parquet
 from rich import table as rich_table
 from rich.text import Text
 
-from auv_analysis.metrics.quantities import Quantity, quantity
+from auv_analysis.metrics.quantities import Quantity
 from auv_analysis.output.arrow import pa
 from auv_analysis.output.new_files import known, write_json
 from auv_analysis.output.text import MISSING, Maths, fixed, number, plain
@@ -73,6 +73,9 @@ class Column:
     def meaning(self) -> str:
         """One line for a reader without the paper."""
         return self.quantity.meaning
+
+
+Shown = Column | Quantity | str  # what a column of a table is
 
 
 @dataclass(frozen=True)
@@ -204,7 +207,7 @@ def make_table(
     name: str,
     caption: str,
     rows: Rows,
-    shown: Mapping[str, Column | Quantity | str] | Sequence[str],
+    shown: Mapping[str, Shown],
     **about: Any,
 ) -> Table:
     """Table from rows or columns of numbers and words.
@@ -213,12 +216,10 @@ def make_table(
     ----------
     name, caption : as of `Table`
     rows : mappings, one per row; or column -> values; or an Arrow table; NaN and None are unknown
-    shown : column -> what it is; names alone: each is looked up in the registry of quantities
+    shown : column -> what it is
     about : note, stub, file, pointer, anchor, folded of `Table`
 
     """
-    if not isinstance(shown, Mapping):
-        shown = {column: quantity(column) for column in shown}
     looks = {n: c if isinstance(c, Column) else Column(c) for n, c in shown.items()}
     data = rows if isinstance(rows, pa.Table) else _arrow(rows, list(looks))
     for i, entry in enumerate(data.schema):
@@ -273,12 +274,7 @@ class Results:
     tables: dict[str, Table] = field(default_factory=dict)
 
     def add(
-        self,
-        name: str,
-        caption: str,
-        rows: Rows,
-        shown: Mapping[str, Column | Quantity | str] | Sequence[str],
-        **about: Any,
+        self, name: str, caption: str, rows: Rows, shown: Mapping[str, Shown], **about: Any
     ) -> Table:
         """Add a table, see `make_table`, with a Parquet file of its name."""
         self.tables[name] = make_table(name, caption, rows, shown, file=f'{name}.parquet', **about)
@@ -343,10 +339,6 @@ def terminal(table: Table, *, title: bool = False) -> rich_table.Table:
     return shown
 
 
-Shown = Column | Quantity | str  # what a column of a table is
-Keys = tuple[str | int, ...]  # of a value in a document: a JSON pointer before it is spelled
-
-
 def view_of_file(
     name: str,
     caption: str,
@@ -381,7 +373,7 @@ def document_table(
     ----------
     results : whose facts are the document
     name, caption : as of `Table`
-    rows : column -> `Keys` of a value in the document, or a word that is shown as it stands
+    rows : column -> keys of a value in the document, a tuple, or a word that is shown as it stands
     shown : column -> what it is
     about : note, stub and anchor of `Table`
 

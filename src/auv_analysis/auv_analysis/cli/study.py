@@ -134,13 +134,12 @@ def _examine(
     said = claims_sentences(judged) if judged else []
     leading = min(runs.values(), key=lambda run: run.law != 'gvc').controller
     more: dict[str, list[Section]] = {}
-    sentences = discussion(summaries, leading)
     if found:
         section, gains = sensitivity_section(out, list(found.values()))
         more['tracking'] = [section]
-        sentences += gains
         said = [*gains[:1], *said]
-    more['couplings'] = [Section('discussion', 'Step 6: discussion', sentences)]
+    step_6 = Section('discussion', 'Step 6: discussion', discussion(summaries, leading))
+    more['couplings'] = [step_6]
     return {'more': more, 'sentences': said, 'claims': judged.claims if judged else None}
 
 

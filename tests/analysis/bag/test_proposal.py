@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import yaml
 from helpers.foreign_bags import (
-    SECOND,
     UNNAMED,
     Maker,
     loaded,
@@ -20,7 +19,7 @@ from helpers.foreign_bags import (
     write,
 )
 from helpers.foreign_logs import HEADS, SENSORS, columns, every, maker, text_of
-from helpers.made_messages import STRING, Bag, new, serialized
+from helpers.made_messages import SECOND, STRING, Bag, new, serialized, stamped
 from numpy.testing import assert_allclose
 from rosbags.typesys import get_types_from_msg
 
@@ -36,7 +35,7 @@ from auv_analysis.bag.foreign_topics import (
 )
 from auv_analysis.bag.proposal import Looked, component_of, looked_through, proposal, unit_of
 from auv_analysis.bag.reading import BagContents
-from auv_analysis.bag.step_topics import NotOursError
+from auv_analysis.bag.step_topics import WRENCH, NotOursError
 from auv_analysis.cli import main
 from auv_analysis.runs.run import Run
 
@@ -192,13 +191,27 @@ def test_candidates_are_those_with_messages_the_likeliest_first() -> None:
     )
 
 
-def test_of_topics_that_come_as_often_the_one_that_is_called_so_is_likeliest() -> None:
-    names = ['/disturbance', '/wrench', '/wrench_applied']
-    contents = BagContents(types=dict.fromkeys(names, 'geometry_msgs/msg/WrenchStamped'))
-    contents.counts = dict.fromkeys(names, 401)
-    assert candidates(contents)['wrench'] == ['/wrench', '/wrench_applied', '/disturbance']
-    contents.counts['/disturbance'] += 1
-    assert candidates(contents)['wrench'] == ['/disturbance', '/wrench', '/wrench_applied']
+def test_what_is_called_wrench_is_likeliest_and_a_disturbance_is_no_wrench(tmp_path) -> None:
+    bag = Bag(tmp_path / 'ours.mcap')
+    names = ['/wrench_applied', '/disturbance', '/disturbance_estimate', '/analysis/delta_pi']
+    for k in range(9):
+        for topic in [*names, '/tau', *['/auv/wrench'] * (k > 3)]:
+            bag.add(topic, WRENCH, k * SECOND, serialized(stamped('Wrench', k * SECOND, range(6))))
+    path = bag.close()
+    assert candidates(survey(path))['wrench'] == ['/auv/wrench', '/wrench_applied', '/tau']
+    assert proposed(path)[1]['wrench'] == {'topic': '/auv/wrench'}
+
+
+def test_a_disturbance_alone_is_not_taken_for_a_wrench(tmp_path) -> None:
+    (tmp_path / 'run').mkdir()
+    rows = [f'{k},{k},{2 * k},{3 * k}' for k in range(1, 9)]
+    for name in ('disturbance', 'state'):
+        path = tmp_path / 'run' / f'{name}.csv'
+        path.write_text('\n'.join(['t,force_x,disturbance_force_y,yaw', *rows]))
+    assert proposed(tmp_path / 'run')[1]['wrench']['topic'] == 'state'
+    assert proposed(path)[1]['wrench']['fields'] == {'X': 'force_x'}
+    path.rename(path.with_name('analysis.csv'))
+    assert proposed(path.with_name('analysis.csv'))[1]['wrench']['fields'] == {'X': 'force_x'}
 
 
 @pytest.mark.parametrize(('kinds', 'options'), [

@@ -19,10 +19,10 @@ from auv_analysis.bag.foreign_fields import (
 )
 from auv_analysis.bag.metadata import is_log
 from auv_analysis.bag.reading import BagContents
-from auv_analysis.bag.step_topics import NotOursError
+from auv_analysis.bag.step_topics import NotOursError, role_of
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import check, read_yaml
-from auv_dynamics.ros.interface import GROUND_TRUTH
+from auv_dynamics.ros.interface import GROUND_TRUTH, WRENCH
 
 SCHEMA = Path(__file__).with_name('mapping.schema.json')
 MEASURED = ('odometry', 'pose', 'twist')
@@ -35,6 +35,7 @@ CANDIDATES = ('odometry', 'pose', 'twist', 'wrench', 'setpoint', 'thrusters')
 ASKED = ('cmd', 'command', 'desired', 'goal', 'ref', 'reference', 'setpoint', 'target')
 THRUSTING = ('actuator', 'actuators', 'esc', 'motor', 'motors', 'propeller', 'propellers', 'pwm',
              'servo', 'servos', 'thrust', 'thruster', 'thrusters', 'thrusts')  # fmt: skip
+DERIVED = ('analysis', 'disturbance')  # neither measured nor commanded
 FROM_ATTITUDE = 'from attitude'
 SHOWN = 6  # topics of a role in one line
 MOTION = (*POSITION, *EULER, *VELOCITY, *RATES)  # components of it
@@ -213,9 +214,10 @@ def candidates(contents: BagContents) -> dict[str, list[str]]:
 
     An odometry is no candidate for pose and twist, a velocity whose name says that it is asked
     for is one for the set-point alone, and an array holds thrusts only where its name says so:
-    states of filters come in arrays as well.
+    states of filters come in arrays as well. What is called wrench is commanded, a disturbance not.
     """
-    types = {topic: kind for topic, kind in contents.types.items() if contents.counts.get(topic)}
+    types = {topic: kind for topic, kind in contents.types.items()
+             if contents.counts.get(topic) and not _has_word(topic, DERIVED)}  # fmt: skip
     found = {role: _fitting(types, role) for role in CANDIDATES}
     whole = set(found['odometry'])
     for role in ('pose', 'twist', 'setpoint'):
@@ -223,8 +225,11 @@ def candidates(contents: BagContents) -> dict[str, list[str]]:
     found['setpoint'] = [topic for topic in found['setpoint'] if _is_asked(topic)]
     found['twist'] = [topic for topic in found['twist'] if not _is_asked(topic)]
     found['thrusters'] = [topic for topic in found['thrusters'] if _has_word(topic, THRUSTING)]
+    counts = contents.counts
     return {
-        role: sorted(topics, key=lambda t: (-contents.counts[t], not _has_word(t, {role}), t))
+        role: sorted(
+            topics, key=lambda t: (role_of(t) != WRENCH, -counts[t], not _has_word(t, {role}), t)
+        )
         for role, topics in found.items()
     }
 

@@ -24,7 +24,7 @@ from auv_analysis.bag.foreign_fields import (
     numbers,
     presets,
 )
-from auv_analysis.bag.foreign_topics import ASKED, THRUSTING, candidates
+from auv_analysis.bag.foreign_topics import ASKED, DERIVED, THRUSTING, candidates
 from auv_analysis.bag.mavlink_presets import CURVE
 from auv_analysis.bag.reading import BagContents
 from auv_dynamics.files.errors import InputError
@@ -195,7 +195,7 @@ def component_of(topic: str, path: str, *, forces: bool = False) -> str:
     own = [word for word in words_of(path) if word not in UNITS and word not in NAMED]
     own = own or words_of(path)
     words, exact = [*words_of(topic), *own], path.rpartition('.')[2]
-    if not own or (NOT_MEASURED | set(THRUSTING)).intersection(words):
+    if not own or {*NOT_MEASURED, *THRUSTING}.intersection(words) or {*DERIVED}.intersection(own):
         return ''
     forced, last = bool(set(FORCING) & set(words)), own[-1]
     capital = (forced or forces) and exact in COMPONENTS['wrench']
@@ -297,9 +297,9 @@ def proposal(bag: Path, contents: BagContents, looked: Mapping[str, Looked]) -> 
 
 def _entries(role: str, looked: Mapping[str, Looked]) -> list[dict[str, Any]]:
     """Topics that together have the components of a role, those with most of them first."""
-    asked = [topic for topic in looked if role != 'wrench' and set(words_of(topic)) & set(ASKED)]
+    other = {*DERIVED, *(ASKED if role != 'wrench' else ())}
     offers = {topic: offered(role, topic, one) for topic, one in looked.items()
-              if topic not in asked}  # fmt: skip
+              if len(looked) == 1 or other.isdisjoint(words_of(topic))}  # fmt: skip
     missing = {name for offer in offers.values() for name in offer}
     chosen: list[dict[str, Any]] = []
     while missing:

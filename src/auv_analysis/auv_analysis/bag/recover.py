@@ -248,11 +248,8 @@ def _settle_metadata(folder: Path, report: Report) -> str:
             return 'unchanged'
     except (InputError, LookupError, TypeError, AttributeError):
         told = {}
-    told = told if isinstance(told, dict) else {}
-    mode = str(told.get('compression_mode', '')).lower()  # of files: they are not, any more
-    kept = ['compression_format', 'compression_mode'] if mode == 'message' else []
-    for key in (*kept, 'custom_data', 'ros_distro'):
-        if told.get(key):
+    for key in ('custom_data', 'ros_distro'):
+        if isinstance(told, dict) and told.get(key):
             document[key] = told[key]
     write_metadata(folder, as_text(document))
     return 'written'

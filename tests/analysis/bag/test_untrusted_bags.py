@@ -37,6 +37,7 @@ from auv_analysis.bag.chunks import Body
 from auv_analysis.bag.load import load_run
 from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.reading import BagContents, read_bag
+from auv_analysis.bag.recover import recover
 from auv_analysis.bag.writer import BagWriter
 from auv_analysis.cli.main import main
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
@@ -157,6 +158,22 @@ def test_a_repair_is_not_blown_up_either(
     assert ended.value.code == 1
     assert 'nothing in it can be recovered' in capsys.readouterr().err
     assert os.listdir(path.parent) == ['bag_0.mcap']
+
+
+def test_a_repair_keeps_what_stands_around_a_chunk_that_is_too_large(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(limits, 'LARGEST_CHUNK', 1000)
+    head = costly_bags.schema(1, 'x/Y') + costly_bags.channel(1, '/x')
+    held = [head + costly_bags.message(1, k, bytes(size)) for k, size in enumerate((5, 999, 7))]
+    path = tmp_path / 'bag_0.mcap'
+    path.write_bytes(data := costly_bags.file_of(*map(costly_bags.chunk, held)))
+    old(path)
+    (found,) = recover(tmp_path).document()['files']
+    told = f'expected a chunk of at most 1000 bytes, found {len(held[1])}, decompressed'
+    assert found['faults'] == [f'damaged: {told}']
+    assert found['messages'] == 2
+    assert (tmp_path / found['kept_as']).read_bytes() == data
 
 
 @pytest.mark.parametrize('opcode', [3, 4, 5, 6, 7, 9, 12, 0x80])

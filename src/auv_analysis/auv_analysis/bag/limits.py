@@ -32,11 +32,15 @@ MOST_NAMED = 10_000  # channels of a file; as many schemas, attachments and meta
 
 
 class TooLargeError(McapError):
-    """More than we are willing to hold; the text says what and how much."""
+    """More than we are willing to hold: what is expected, and how much was found."""
+
+    def __str__(self) -> str:
+        """As a report of a repair shows it."""
+        return 'expected {}, found {}'.format(*self.args)
 
 
 class TooManyError(TooLargeError):
-    """More records than we are willing to look at; the text says of what and how many."""
+    """More records than we are willing to look at."""
 
 
 class Counts:

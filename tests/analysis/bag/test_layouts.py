@@ -28,7 +28,9 @@ from mcap.writer import Writer as McapWriter
 from numpy.testing import assert_allclose
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.typesys import get_types_from_msg
 
+from auv_analysis.bag.any_bag import messages as messages_of
 from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.load import load_run
 from auv_analysis.bag.recover import recover
@@ -271,6 +273,25 @@ def test_types_of_ros_are_known_where_rosbag2_had_no_definition_of_them(
     if not text:
         found = loaded(tmp_path / 'bag.mcap', odometry='/odom', wrench='/wrench')
         assert_allclose(found.nu, run.nu, atol=1e-9)
+
+
+@pytest.mark.parametrize('language', ['unknown', ''])
+def test_a_database_without_a_definition_of_some_types_is_read(language, tmp_path) -> None:
+    maker = Maker()
+    maker.store.register(get_types_from_msg('float64 a\n', 'rov_msgs/msg/Own'))
+    wrench = maker.stamped('Wrench', 0, 'base', maker.six('Wrench', np.arange(6.0)))
+    both = [('/w', 0, wrench), ('/own', 0, maker.new('rov_msgs/msg/Own', 1.0))]
+    bag = write(tmp_path / 'bag', both, maker, kind='sqlite3')
+    (file,) = bag.glob('*.db3')
+    empty = "UPDATE message_definitions SET encoding = ?, encoded_message_definition = ''"
+    with closing(sqlite3.connect(file)) as recorder:
+        recorder.execute(empty, (language,))
+        recorder.commit()
+    for path in (bag, file):
+        assert survey(path).counts == {'/w': 1, '/own': 1}
+        assert [one.message.wrench.torque.z for one in messages_of(path, ['/w'], [])] == [5.0]
+        with pytest.raises(InputError, match=r'/own: expected .* found none of rov_msgs/msg/Own'):
+            next(messages_of(path, ['/own'], []))
 
 
 def test_an_mcap_that_was_not_finished_is_read_as_far_as_it_goes(run, tmp_path) -> None:

@@ -41,6 +41,10 @@ Result = TypeVar('Result')
 Decoder = Callable[[bytes], Any]
 MOST_KEPT = 64  # decoders: channels of one type share theirs
 RULE = '=' * 80 + '\n'  # between the parts of a definition
+DEFINED = (  # what hides definitions in no language that rosbags knows
+    'CREATE TEMP VIEW message_definitions AS SELECT * FROM main.message_definitions '
+    "WHERE encoding IN ('ros2msg', 'ros2idl')"
+)
 LANGUAGES = {'ros2msg': 'msg', 'ros1msg': 'msg', 'ros2idl': 'idl'}  # of MCAP's schemas
 
 
@@ -252,7 +256,8 @@ def _opened(bag: Path) -> Iterator[Any]:
         _check_closed(file)
     try:
         reader: Any = rosbag1.Reader(bag) if _is_ros1(bag) else rosbag2.Reader(bag)
-        reader.open()
+        with _defined():
+            reader.open()
     except Exception as error:  # of SQLite, of YAML, of the library: by what the file is
         raise refusal(bag, '', 'a bag that rosbags can open', error) from None
     try:
@@ -261,6 +266,22 @@ def _opened(bag: Path) -> Iterator[Any]:
         yield reader
     finally:
         reader.close()
+
+
+@contextmanager
+def _defined() -> Iterator[None]:
+    """Hide from rosbags the definitions of types for which rosbag2 found no file, as of actions.
+
+    It opens no SQLite bag that has one.
+    """
+    from rosbags.rosbag2 import storage_sqlite3
+
+    hooks: list[Any] = getattr(getattr(storage_sqlite3, 'apsw', None), 'connection_hooks', [])
+    hooks.append(lambda connection: connection.execute(DEFINED))
+    try:
+        yield
+    finally:
+        hooks.pop()
 
 
 @lru_cache(MOST_KEPT)
@@ -295,7 +316,10 @@ def decoder(name: str, definition: str, language: str, encoding: str) -> Decoder
         text = part.partition('\n')[2] if part.startswith('IDL: ') else part
         if text.strip():
             store.register(get_types_from_idl(text))
-    kind = store.get_msgdef(name)  # that the definition defines it shows here
+    try:
+        kind = store.get_msgdef(name)
+    except KeyError as error:
+        raise ValueError(f'none of {error.args[0]}') from None
     if encoding == 'cdr':
         return partial(_of_cdr, store, kind)
     return partial(store.deserialize_ros1, typename=name)

@@ -104,6 +104,17 @@ def test_a_single_message_of_another_time_is_left_out_and_counted() -> None:
     assert len(found.rows) == 3, 'a clock that begins anew by little'
 
 
+@pytest.mark.parametrize(('seconds', 'kept'), [
+    ([10, 11, 0, 0, 14, 900, 901, 17, 18], [0, 1, 4, 7, 8]), ([10], [0]),
+    ([10, 0, 0, 13, 14, 0, 16], [0, 3, 4, 6]),
+    ([0, 1, 900, 901, 2, 3, 902, 903], [0, 1, 2, 3]), ([10, 11, 0, 1, 2, 15, 16], [2, 3, 4, 5, 6]),
+    ([0, 0, 12, 13], [0, 1, 2, 3]), ([10, 11, 12, 0, 0], [0, 1, 2]),
+])  # fmt: skip
+def test_so_are_two_in_a_row_but_no_clocks_in_turn(seconds, kept) -> None:
+    found = longest_stretch(recorded(np.array(seconds) * SECOND), [])
+    assert_array_equal(found.rows[:, 0], kept)
+
+
 def test_a_pause_makes_no_bursts() -> None:
     notes: list[str] = []
     _retimed(recorded(np.r_[np.arange(50), 10**6 + np.arange(50)] * 10**7), notes)

@@ -149,21 +149,32 @@ def _set_back(ns: np.ndarray, apart: np.ndarray) -> Iterator[int]:
 
 
 def strays(ns: np.ndarray, topic: str, notes: list[str]) -> np.ndarray:
-    """Which stamps (n,) jump alone in the order of the bag, so that those around go on without it.
+    """Which stamps (n,) jump, alone or by twos, so that those around go on without them.
 
     Parameters
     ----------
-    ns : (n,) stamps
+    ns : (n,) stamps in the order of the bag
     topic, notes : gets a line that counts them
 
     """
-    back, found = np.diff(ns) < -BACK, np.zeros(len(ns), bool)
-    found[1:-1] = (back[:-1] | back[1:]) & (ns[2:] >= ns[:-2])
-    found &= ~np.roll(found, 1) & ~np.roll(found, -1)  # two clocks in turn are no strays
+    found = np.zeros(len(ns), bool)
+    for width in (1, 2) if np.any(np.diff(ns) < -BACK) else ():
+        left = np.flatnonzero(~found)
+        found[left[_jumps(ns[left], width)[:, None] + np.arange(width)]] = True
     if count := np.count_nonzero(found):
         lost = f'{topic}: {count} of {len(ns)} messages were left out'
         notes.append(f'{lost}: their stamps are far off those around them')
     return found
+
+
+def _jumps(ns: np.ndarray, width: int) -> np.ndarray:
+    """Where stamps (n,) jump for so many messages and then go on; not for two clocks in turn."""
+    count = max(len(ns) - width - 1, 0)
+    before, first, last, behind = (ns[i:][:count] for i in (0, 1, width, width + 1))
+    falls = (before - first > BACK) | (last - behind > BACK)
+    begins = np.flatnonzero(falls & (behind >= before)) + 1
+    apart = np.diff(begins, prepend=-width, append=len(ns) + width) > width
+    return begins[apart[:-1] & apart[1:]]
 
 
 def are_swapped(ns: np.ndarray) -> bool:

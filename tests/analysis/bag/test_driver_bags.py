@@ -1,5 +1,6 @@
 """Bags of a driver: stamps of its own, set-points on another grid, topics under other names."""
 
+import contextlib
 import json
 import tempfile
 from itertools import product
@@ -25,6 +26,7 @@ from auv_analysis.nodes.recorder_node import StepLedger
 from auv_analysis.runs.run import Run
 from auv_analysis.studies.compare.sources import open_source, sources_of
 from auv_dynamics.files.errors import InputError
+from auv_gvc_controller.control.setpoint_buffer import NONE, SetpointBuffer
 
 MS = 1_000_000
 VEHICLE = load_scenario('case1').attachments['vehicle.yaml']
@@ -281,7 +283,7 @@ def test_a_set_point_holds_no_longer_than_the_controller_holds_it(tmp_path, told
 
 
 @pytest.mark.parametrize(('stamps', 'kept'), [
-    ([0, 1, 2, 3], [0, 1, 2, 3]), ([0, 10, 20, 30, 5, 15], [0, 4, 5]), ([0, 10, 10], [0, 1, 2]),
+    ([0, 1, 2, 3], [0, 1, 2, 3]), ([0, 10, 20, 30, 5, 15], [0, 4, 5]), ([0, 10, 10], [0, 1]),
     ([0, 20, 40, 10, 30, 15], [0, 3, 5]), ([100_000, 0, 100_010, 0], [0, 1, 2, 3]), ([], []),
 ])  # fmt: skip
 def test_a_set_point_takes_the_place_of_those_that_lie_ahead_of_it(stamps, kept) -> None:
@@ -290,6 +292,27 @@ def test_a_set_point_takes_the_place_of_those_that_lie_ahead_of_it(stamps, kept)
     assert_array_equal(found['cmd_vel'][0], ns[kept])
     assert_array_equal(found['cmd_vel'][1], rows[kept])
     assert found['odom'][0] is ns
+
+
+@given(stamps=st.lists(st.integers(0, 9), max_size=30))
+@quick
+def test_of_columns_those_set_points_are_kept_that_a_controller_keeps(stamps) -> None:
+    buffer = SetpointBuffer(exact=False, acceleration=NONE, steepest=(1.0,) * 6)
+    for k, ns in enumerate(stamps):
+        with contextlib.suppress(ValueError):
+            buffer.setpoint(ns, (float(k),) * 6)
+    ns, rows = obeyed({'cmd_vel': (np.array(stamps, np.int64), np.arange(len(stamps)))})['cmd_vel']
+    found = {now: buffer.find(now) for now in range(10)}
+    kept = {now: rows[ns <= now][-1:].tolist() for now in found}
+    assert {now: [one.nu_d[0]] if one else [] for now, one in found.items()} == kept
+
+
+@pytest.mark.parametrize('params', ['lockstep: true', 'lockstep: false'])
+def test_a_set_point_that_repeats_a_stamp_was_refused(tmp_path, params) -> None:
+    stamps, given = range(1000, 1060, GRID), [1000, 1000, 1020, 1040, 1040]
+    told = f'/**/controller_node:\n  ros__parameters: {{setpoint_pairing: latest, {params}}}\n'
+    run = load_run(write(tmp_path, stamps, given, params=told))
+    assert_array_equal(run.nu_d[:, 0], [0, 2, 3])
 
 
 @pytest.mark.parametrize('lockstep', ['false', 'true'])
@@ -315,11 +338,14 @@ def test_of_an_unknown_recorder_set_points_with_stamps_of_their_own_are_held(
 ) -> None:
     own = load_run(write(tmp_path / 'own', STAMPS, SETPOINTS, recording=''))
     assert_array_equal(own.nu_d[:, 0], [1.0, 2.0, 2.0, 4.0])
+    held = 'cmd_vel: taken as held until the next one, since {} odometry messages have none of'
+    assert any(held.format('2 of 4') in note for note in own.notes)
     often, seldom = list(range(1000, 1110, 10)), [1000, 1030, 1060, 1090]
     sparse = load_run(write(tmp_path / 'sparse', often, seldom, recording=''))
     assert_array_equal(sparse.nu_d[:, 0], [0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3])
     same = load_run(write(tmp_path / 'same', STAMPS, STAMPS[:3], recording=''))
     assert_array_equal(same.nu_d[:, 0], [0.0, 1.0, 2.0])
+    assert not any('taken as held' in note for note in same.notes)
     another = write(tmp_path / 'another', STAMPS, [10, 20, 30], ahead=0, recording='')
     with pytest.raises(InputError, match='at least two steps'):
         load_run(another)

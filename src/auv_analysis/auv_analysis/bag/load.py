@@ -37,7 +37,8 @@ Steps = tuple[np.ndarray, dict[str, np.ndarray]]  # stamps (n,) in ns, role -> v
 SETPOINTS = (interface.CMD_VEL, interface.CMD_ACCEL)
 LATEST = 'latest'
 AHEAD = 60 * interface.NANOSECONDS  # ns, further than that no set-point lies ahead
-PAIRED = 0.75  # share of odometry with a set-point of its stamp, from which each should have one
+NEVER = np.iinfo(np.int64).max
+UNPAIRED = 0.25  # share of odometry without a set-point of its stamp, up to which they were lost
 
 
 class Recording(NamedTuple):
@@ -98,8 +99,12 @@ def open_bag(
     series, begun = (series, []) if contents.strict else longest_stretch(series, whole)
     controller = parameters.get(interface.CONTROLLER, {})
     # where the bag does not say it: a controller beside a driver held its set-points
-    free = contents.strict is False or (contents.strict is None and _have_own_stamps(series))
+    lacking, between = _unpaired(series) if contents.strict is None else (0, 0)
+    free = contents.strict is False or lacking > UNPAIRED * between
     if held := controller.get('setpoint_pairing', LATEST if free else None) == LATEST:
+        if lacking and 'setpoint_pairing' not in controller:
+            told = f'{lacking} of {between} odometry messages have none of their stamp'
+            begun.append(f'{interface.CMD_VEL}: taken as held until the next one, since {told}')
         timeout, lockstep = controller.get('setpoint_timeout'), controller.get('lockstep') is True
         if not lockstep:
             series = obeyed(series, whole)
@@ -154,8 +159,8 @@ def read_vehicle(bag: Path, namespace: str | None, whole: float = math.inf) -> B
         return contents
 
 
-def _have_own_stamps(series: Mapping[str, Series]) -> bool:
-    """Whether set-points came at other times than the odometry between them, on its clock."""
+def _unpaired(series: Mapping[str, Series]) -> tuple[int, int]:
+    """How much odometry between the set-points has none of its stamp, and how much there is."""
     odometry, _ = series[interface.ODOM]
     stamps, _ = series.get(interface.CMD_VEL, series[interface.ODOM])
     stamps, met, count = stamps if _is_rising(stamps) else np.sort(stamps), 0, 0
@@ -164,7 +169,7 @@ def _have_own_stamps(series: Mapping[str, Series]) -> bool:
         between = ns[(ns >= stamps[0]) & (ns <= stamps[-1])]
         met += int((stamps[np.searchsorted(stamps, between)] == between).sum())
         count += len(between)
-    return met < PAIRED * count
+    return count - met, count
 
 
 def _dropped(role: str, stamps: np.ndarray, kept: int) -> list[str]:
@@ -437,15 +442,17 @@ def _picked(rows: np.ndarray, index: np.ndarray, whole: float) -> np.ndarray:
 def obeyed(series: Mapping[str, Series], whole: float = math.inf) -> dict[str, Series]:
     """The series, role -> stamps in the order of the bag and rows, as a controller follows them.
 
-    In real time a set-point that comes takes the place of those that lie ahead of its stamp.
+    In real time a set-point takes the place of those that lie ahead of its stamp, and one that
+    repeats a stamp is refused: of messages one by one, `SetpointBuffer` says the same.
     """
     found = dict(series)
     for role in SETPOINTS:
         if role in series and not _is_rising(series[role][0]):
             ns, rows = series[role]
+            index = np.flatnonzero(np.diff(ns, prepend=-1))
             late = np.maximum.accumulate(ns) - ns > AHEAD  # refused: of no time that lies ahead
-            later = np.where(late, np.iinfo(np.int64).max, ns)
-            kept = np.flatnonzero(ns <= np.minimum.accumulate(later[::-1])[::-1])
+            least = np.minimum.accumulate(np.where(late, NEVER, ns)[index][::-1])[::-1]
+            kept = index[ns[index] < np.append(least[1:], NEVER)]
             found[role] = ns[kept], _picked(rows, kept, whole)
     return found
 
@@ -456,7 +463,7 @@ def held_series(
     """The series, role -> stamps and rows, with set-points at the stamps of the odometry.
 
     A set-point holds until the next one, or the timeout, s: each odometry has the newest at or
-    before its stamp. Notes say where it was too old.
+    before its stamp, the first of a doubled one. Notes say where it was too old.
     """
     notes = list[str]()
     stamps = np.sort(series[interface.ODOM][0])
@@ -464,10 +471,10 @@ def held_series(
     for role in SETPOINTS:
         if role in series:
             ns, rows = series[role]
-            order = np.argsort(ns, kind='stable')
-            index = np.searchsorted(ns, stamps, 'right', sorter=order) - 1
+            ns, first = np.unique(ns, return_index=True)
+            index = np.searchsorted(ns, stamps, 'right') - 1
             known = index >= 0
-            age = (stamps - ns[order[index]]) / interface.NANOSECONDS
+            age = (stamps - ns[index]) / interface.NANOSECONDS
             if role == interface.CMD_VEL and (count := np.count_nonzero(known & (age > timeout))):
                 text = f'{role}: older than {timeout:g} s, the timeout of the controller, at '
                 notes.append(f'{text}{count} of {len(stamps)} odometry messages: not held there')
@@ -475,5 +482,5 @@ def held_series(
                 if not known.any():  # such as stamps of zero, which the controller refused
                     del held[role]
                     continue
-            held[role] = stamps[known], _picked(rows, order[index[known]], whole)
+            held[role] = stamps[known], _picked(rows, first[index[known]], whole)
     return held, notes

@@ -177,13 +177,14 @@ def test_candidates_are_those_with_messages_the_likeliest_first() -> None:
         '/cmd_vel': ('geometry_msgs/msg/Twist', 9),
         '/dvl': ('geometry_msgs/msg/TwistStamped', 7), '/tau': ('geometry_msgs/msg/Wrench', 9),
         '/a/tau': ('geometry_msgs/msg/Wrench', 9),
+        '/thrusterInput': ('std_msgs/msg/Float64MultiArray', 9),
     }  # fmt: skip
     kinds = {topic: kind for topic, (kind, _) in topics.items()}
     contents = BagContents(types=kinds, counts={topic: n for topic, (_, n) in topics.items()})
     found = {role: names for role, names in candidates(contents).items() if names}
     assert found == {
         'odometry': ['/b/odom', '/a/odom', '/ref/odom'], 'twist': ['/dvl'],
-        'wrench': ['/a/tau', '/tau'], 'setpoint': ['/cmd_vel'],
+        'wrench': ['/a/tau', '/tau'], 'setpoint': ['/cmd_vel'], 'thrusters': ['/thrusterInput'],
     }  # fmt: skip
     others = {'/a/odom': kinds['/a/odom'], '/sim/ground_truth/odom': kinds['/a/odom']}
     assert other_odometries(kinds | others, '/a/odom').endswith(

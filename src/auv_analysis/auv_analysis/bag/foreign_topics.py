@@ -1,7 +1,7 @@
 """Topics of other systems: the mapping to their roles, and the candidates in a bag."""
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,12 @@ ASKED = ('cmd', 'command', 'desired', 'goal', 'ref', 'reference', 'setpoint', 't
 THRUSTING = ('actuator', 'actuators', 'esc', 'motor', 'motors', 'propeller', 'propellers', 'pwm',
              'servo', 'servos', 'thrust', 'thruster', 'thrusters', 'thrusts')  # fmt: skip
 DERIVED = ('analysis', 'disturbance')  # neither measured nor commanded
+TURNS = {'roll': 0, 'phi': 0, 'pitch': 1, 'theta': 1, 'yaw': 2, 'psi': 2, 'heading': 2}
+JOINED = {  # words that are two
+    **{f'{kind}{axis}': (kind, axis) for kind in 'vfq' for axis in 'xyz'},
+    **{f'{turn}{rate}': (turn, rate) for turn in TURNS for rate in ('rate', 'speed')},
+    'qw': ('q', 'w'), 'angvel': ('angular', 'vel'),
+}  # fmt: skip
 FROM_ATTITUDE = 'from attitude'
 SHOWN = 6  # topics of a role in one line
 MOTION = (*POSITION, *EULER, *VELOCITY, *RATES)  # components of it
@@ -217,18 +223,18 @@ def candidates(contents: BagContents) -> dict[str, list[str]]:
     states of filters come in arrays as well. What is called wrench is commanded, a disturbance not.
     """
     types = {topic: kind for topic, kind in contents.types.items()
-             if contents.counts.get(topic) and not _has_word(topic, DERIVED)}  # fmt: skip
+             if contents.counts.get(topic) and not has_word(topic, DERIVED)}  # fmt: skip
     found = {role: _fitting(types, role) for role in CANDIDATES}
     whole = set(found['odometry'])
     for role in ('pose', 'twist', 'setpoint'):
         found[role] = [topic for topic in found[role] if topic not in whole]
-    found['setpoint'] = [topic for topic in found['setpoint'] if _is_asked(topic)]
-    found['twist'] = [topic for topic in found['twist'] if not _is_asked(topic)]
-    found['thrusters'] = [topic for topic in found['thrusters'] if _has_word(topic, THRUSTING)]
+    found['setpoint'] = [topic for topic in found['setpoint'] if has_word(topic, ASKED)]
+    found['twist'] = [topic for topic in found['twist'] if not has_word(topic, ASKED)]
+    found['thrusters'] = [topic for topic in found['thrusters'] if has_word(topic, THRUSTING)]
     counts = contents.counts
     return {
         role: sorted(
-            topics, key=lambda t: (role_of(t) != WRENCH, -counts[t], not _has_word(t, {role}), t)
+            topics, key=lambda t: (role_of(t) != WRENCH, -counts[t], not has_word(t, {role}), t)
         )
         for role, topics in found.items()
     }
@@ -238,12 +244,18 @@ def _fitting(types: Mapping[str, str], role: str) -> list[str]:
     return [topic for topic, kind in types.items() if kind in presets(role)]
 
 
-def _is_asked(topic: str) -> bool:
-    return _has_word(topic, ASKED)
+def words_of(path: str) -> list[str]:
+    """Words of a topic or path: 'linearVel_x [m/s]' is linear, vel, x."""
+    plain = re.sub(r'\(.*?\)|\[[^\d\]].*?\]', ' ', path)
+    found: list[str] = []
+    for word in re.findall(r'[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+', plain):
+        found += JOINED.get(word.lower(), (word.lower(),))
+    return found
 
 
-def _has_word(topic: str, words: Collection[str]) -> bool:
-    return any(word in words for word in re.split(r'[\W\d_]+', topic.lower()))
+def has_word(name: str, words: Iterable[str]) -> bool:
+    """Whether one of some words stands in the name of a topic or path."""
+    return not set(words).isdisjoint(words_of(name))
 
 
 def other_odometries(types: Mapping[str, str], topic: str) -> str:

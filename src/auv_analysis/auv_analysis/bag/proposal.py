@@ -24,7 +24,15 @@ from auv_analysis.bag.foreign_fields import (
     numbers,
     presets,
 )
-from auv_analysis.bag.foreign_topics import ASKED, DERIVED, THRUSTING, candidates
+from auv_analysis.bag.foreign_topics import (
+    ASKED,
+    DERIVED,
+    THRUSTING,
+    TURNS,
+    candidates,
+    has_word,
+    words_of,
+)
 from auv_analysis.bag.mavlink_presets import CURVE
 from auv_analysis.bag.reading import BagContents
 from auv_dynamics.files.errors import InputError
@@ -49,15 +57,9 @@ KINDS = {  # what a word says of the x, y and z, or 0, 1 and 2, behind it
     'mag': (), 'magnetic': (), 'bias': (),
 }  # fmt: skip
 AXES = {'x': 0, 'y': 1, 'z': 2, 'north': 0, 'east': 1, 'down': 2, '0': 0, '1': 1, '2': 2}
-TURNS = {'roll': 0, 'phi': 0, 'pitch': 1, 'theta': 1, 'yaw': 2, 'psi': 2, 'heading': 2}
 ALONG = {'surge': 0, 'sway': 1, 'heave': 2}
 TURNING = ('rate', 'rates', 'speed', 'vel', 'velocity', 'dot', 'gyro', 'angular')
 FORCING = ('force', 'torque', 'moment', 'tau', 'wrench')
-JOINED = {  # words that are two
-    **{f'{kind}{axis}': (kind, axis) for kind in 'vfq' for axis in 'xyz'},
-    **{f'{turn}{rate}': (turn, rate) for turn in TURNS for rate in ('rate', 'speed')},
-    'qw': ('q', 'w'), 'angvel': ('angular', 'vel'),
-}  # fmt: skip
 PULSES = (800.0, 2200.0)  # us, of servos
 NOT_MEASURED = {'cov', 'covariance', 'std', 'stddev', 'var', 'variance', 'err', 'error', 'sigma'}
 NAMED = {'degs': 'deg/s', 'dps': 'deg/s', 'degrees': 'deg', 'rads': 'rad/s', 'mms': 'mm/s'}
@@ -178,15 +180,6 @@ def looked_through(bag: Path, contents: BagContents) -> dict[str, Looked]:
     return found
 
 
-def words_of(path: str) -> list[str]:
-    """Words of a topic or path: 'linearVel_x [m/s]' is linear, vel, x."""
-    plain = re.sub(r'\(.*?\)|\[[^\d\]].*?\]', ' ', path)
-    found: list[str] = []
-    for word in re.findall(r'[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+', plain):
-        found += JOINED.get(word.lower(), (word.lower(),))
-    return found
-
-
 def component_of(topic: str, path: str, *, forces: bool = False) -> str:
     """Component that a path in a topic is named after; '' where that is not clear.
 
@@ -297,9 +290,9 @@ def proposal(bag: Path, contents: BagContents, looked: Mapping[str, Looked]) -> 
 
 def _entries(role: str, looked: Mapping[str, Looked]) -> list[dict[str, Any]]:
     """Topics that together have the components of a role, those with most of them first."""
-    other = {*DERIVED, *(ASKED if role != 'wrench' else ())}
+    other = (*DERIVED, *(ASKED if role != 'wrench' else ()))
     offers = {topic: offered(role, topic, one) for topic, one in looked.items()
-              if len(looked) == 1 or other.isdisjoint(words_of(topic))}  # fmt: skip
+              if len(looked) == 1 or not has_word(topic, other)}  # fmt: skip
     missing = {name for offer in offers.values() for name in offer}
     chosen: list[dict[str, Any]] = []
     while missing:
@@ -337,7 +330,7 @@ def _thrusters(known: Sequence[str], looked: Mapping[str, Looked]) -> list[dict[
         if topic in known:
             return [{'topic': topic}]
         paths = [path for path in one.spans
-                 if set(words_of(f'{topic} {path}')) & set(THRUSTING)
+                 if has_word(f'{topic} {path}', THRUSTING)
                  and re.search(r'\d', path) and not one.is_dead([path])]  # fmt: skip
         if len(paths) > len(best):
             best, where = paths, topic

@@ -1,7 +1,7 @@
 """Signals over time with gaps, their values at any times, and a common time base."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +41,7 @@ class Track:
     held : whether a sample holds until the next; else a straight line leads there
     parts : signals of the topics that it is made of, NaN in columns that these do not have
     told : whether the limit was told rather than found
+    resets : (r, 2) ns, between which the signal begins anew, which is a gap
 
     """
 
@@ -52,6 +53,7 @@ class Track:
     held: bool
     parts: tuple['Track', ...] = ()
     told: bool = False
+    resets: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
 
     @property
     def given(self) -> np.ndarray:
@@ -71,9 +73,9 @@ class Track:
     def gaps(self) -> np.ndarray:
         """Begin and end of each gap, of any of its topics, (g, 2) ns."""
         if self.parts:
-            return np.concatenate([part.gaps() for part in self.parts])
+            return np.concatenate([self.resets, *(part.gaps() for part in self.parts)])
         where = np.flatnonzero(np.diff(self.ns) > self.limit)
-        return np.stack([self.ns[where], self.ns[where + 1]], axis=1)
+        return np.concatenate([self.resets, np.stack([self.ns[where], self.ns[where + 1]], axis=1)])
 
     def tolerant(self, pause: float) -> 'Track':
         """The same with no gap up to a pause, ns, in topics whose limit nobody told."""

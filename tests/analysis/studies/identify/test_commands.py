@@ -238,6 +238,18 @@ def test_the_wrench_that_acted_takes_the_place_of_the_command_and_the_truth_that
         )
 
 
+def test_a_reset_cuts_a_bag_and_is_told(tmp_path, capsys):
+    _, run = sea_trials.trial(tmp_path, 'herman2018', 5, duration=3.0)
+    seen = motion(run, enu=False)
+    late = seen._replace(twist=seen.twist + np.outer(run.t > 1.51, [0.3, 0, 0, 0, 0, 0]))
+    messages = simple(late, Maker(), '/odom', '/wrench', ('odom_ned', 'base_link_fsd'))
+    bag, notes = write(tmp_path / 'bag', messages, Maker()), []
+    records = read_records(bag, load_vehicle('herman2018'), None, applied=False, notes=notes)
+    assert [(one.start, one.end) for one in records] == [(0.0, 1.5), pytest.approx((1.52, 3.0))]
+    assert notes[-1] == 'the velocity jumps at 1.52 s, as by a reset: cut there'
+    assert capsys.readouterr().err == f'warning: {bag}: {notes[-1]}\n'
+
+
 def test_a_vehicle_that_no_command_takes_gives_no_file(tmp_path):
     data = yaml.safe_load(shipped('vehicles', 'lauv').read_text(encoding='utf-8'))
     results = Results('identify', {'file': 'vehicle.yaml', 'contradictions': [], 'verdict': ''})

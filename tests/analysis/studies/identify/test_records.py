@@ -11,6 +11,7 @@ import yaml
 from helpers.sea_trials import DELAY, LAG, trial, wrong_prior
 from numpy.testing import assert_allclose, assert_array_equal
 
+from auv_analysis.bag.foreign_checks import doubts_of_rates
 from auv_analysis.bag.tracks import Track, assembled
 from auv_analysis.studies.identify import identify as identifying
 from auv_analysis.studies.identify.bags import on_one_step, parts, without_constants
@@ -35,6 +36,7 @@ from auv_analysis.studies.identify.plausibility import too_short
 from auv_analysis.studies.identify.prediction import held_of, predict, sizes
 from auv_analysis.studies.identify.record import (
     Record,
+    cut_at_jumps,
     described,
     long_enough,
     of_tracks,
@@ -166,20 +168,55 @@ def test_between_two_pauses_close_together_there_is_no_record():
     assert [round(one.end) for one in of_tracks('x', tracks(dict.fromkeys(ROWS, ns)))] == [4, 10]
 
 
-def test_a_jump_of_the_attitude_ends_a_stretch_and_wrong_rates_do_not():
-    ns = np.rint(5e7 * np.arange(201)).astype(np.int64)
-    given, t = tracks(dict.fromkeys(ROWS, ns)), ns / 1e9
-    yaw = 0.3 * np.where(t < 6.01, t, t - 6.05)  # the plant is reset at 6.05 s
-    given['pose'].rows[:, [3, 6]] = np.stack([np.cos(yaw / 2), np.sin(yaw / 2)], axis=1)
-    notes: list[str] = []
-    given['twist'].rows[:, 5] = 0.3
-    found = of_tracks('x', given, notes=notes)
-    assert_allclose([(one.start, one.end) for one in found], [(0.0, 6.0), (6.05, 10.0)])
-    assert notes == ['the attitude jumps at 6.05 s, as by a reset: cut there']
-    given['pose'].rows[:, [3, 6]] = np.stack([np.cos(9 * t), np.sin(9 * t)], axis=1)
-    assert [one.end for one in of_tracks('x', given, notes=notes[:0])] == [10.0]
-    given['twist'].rows[:, 5] = np.nan
-    assert [one.end for one in of_tracks('x', given)] == [10.0]
+def turning(t: np.ndarray, yaw: float = 0.0, sway: float = 0.0) -> dict[str, Track]:
+    """Noise on yaw and sway, at times in s; behind 6 s they are so much more, as by a reset."""
+    given = tracks(dict.fromkeys(ROWS, np.rint(1e9 * t).astype(np.int64)))
+    rng, late = np.random.default_rng(0), t > 6.01
+    given['twist'].rows[:] = rng.normal(0.0, 0.005, (len(t), 6))
+    given['twist'].rows[:, [1, 5]] += 0.2 * np.cos(t)[:, None]
+    given['twist'].rows[:, 1] += sway * late
+    half = (0.2 * np.sin(t) + yaw * late + rng.normal(0.0, 0.003, len(t))) / 2.0
+    given['pose'].rows[:, [3, 6]] = np.stack([np.cos(half), np.sin(half)], axis=1)
+    return given
+
+
+@pytest.mark.parametrize(('jump', 'said'), [
+    ({'yaw': -1.8}, ['attitude']), ({'yaw': 0.08}, ['attitude']), ({'sway': 0.2}, ['velocity']),
+    ({'yaw': 1.0, 'sway': -0.2}, ['attitude', 'velocity']),
+])  # fmt: skip
+def test_a_jump_of_attitude_or_velocity_ends_a_stretch(jump, said):
+    given, notes = cut_at_jumps(turning(0.05 * np.arange(201), **jump))
+    found = [(one.start, one.end) for one in of_tracks('x', given)]
+    assert_allclose(found, [(0.0, 6.0), (6.05, 10.0)])
+    assert notes == [f'the {name} jumps at 6.05 s, as by a reset: cut there' for name in said]
+
+
+def test_rates_are_held_against_the_attitude_within_a_stretch():
+    """Across a reset they contradict it, whatever they are."""
+    given = turning(0.05 * np.arange(201), yaw=-1.8)
+    assert doubts_of_rates(given['pose'], given['twist'])
+    cut, _ = cut_at_jumps(given)
+    assert not doubts_of_rates(cut['pose'], cut['twist'])
+
+
+@pytest.mark.parametrize(('period', 'sway'), [
+    (0.02, lambda t, y: y),
+    (0.02, lambda t, y: np.round(y / 0.05) * 0.05),
+    (0.02, lambda t, _: np.round(4.0 * np.cos(0.3 * t)) * 0.05),  # quanta that come seldom
+    (0.02, lambda t, y: (y + 4.0 * (t > 6.0))[np.arange(len(t)) // 50 * 50] / 20.0),  # repeated
+    (0.02, lambda t, y: y + (np.arange(len(t)) % 270 == 7)),  # spikes
+    (0.02, lambda t, y: np.where(np.sin(700.0 * t) > 0.5, np.nan, y)),
+    (0.02, lambda t, y: np.abs(t % 4.0 - 2.0)),  # as by thrusters that turn round
+    (0.20, lambda t, y: np.where(t < 6.0, 0.0, 0.3 - 0.3 * np.exp(5.0 * (6.0 - t)))),
+    (0.50, lambda t, y: np.where(t < 6.0, 0.0, 0.3)),
+])  # fmt: skip
+def test_what_noise_sensors_and_thrusters_do_is_no_jump(period, sway):
+    t = np.arange(0.0, 20.0, period)
+    t = t[np.cos(40.0 * t * t) < 0.7]  # with drop-outs
+    given = turning(t)
+    given['twist'].rows[:, 1] = sway(t, given['twist'].rows[:, 1])
+    cut, notes = cut_at_jumps(given)
+    assert (notes, len(cut['pose'].resets)) == ([], 0)
 
 
 def test_commands_of_recordings_come_to_the_finest_step():

@@ -16,7 +16,7 @@ from auv_analysis.bag.foreign_tracks import tracks_of, unknown_angles
 from auv_analysis.bag.tracks import Track
 from auv_analysis.output.progress import say
 from auv_analysis.output.text import join
-from auv_analysis.studies.identify.record import Record, long_enough, of_tracks
+from auv_analysis.studies.identify.record import Record, cut_at_jumps, long_enough, of_tracks
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.interface import GROUND_TRUTH, ODOM, WRENCH, WRENCH_APPLIED
 from auv_dynamics.vehicle import DOFS
@@ -62,16 +62,13 @@ def read_records(
     role = WRENCH_APPLIED if applied else WRENCH
     if not tracks[role].given.all():
         raise InputError(bag, role, 'all six components', 'some that no topic has')
-    notes += contradictions(tracks, otherwise, mapping)
+    tracks, warnings = cut_at_jumps(tracks, role)
     if not applied and WRENCH_APPLIED in tracks:
-        for note in _not_acting(tracks[WRENCH].rows, tracks[WRENCH_APPLIED].rows):
-            say(f'warning: {bag}: {note}')
-            notes.append(note)
-    jumps: list[str] = []
-    records = of_tracks(bag.name, tracks, role, jumps)
-    for note in jumps:
+        warnings += _not_acting(tracks[WRENCH].rows, tracks[WRENCH_APPLIED].rows)
+    for note in warnings:
         say(f'warning: {bag}: {note}')
-    notes += jumps
+    notes += [*contradictions(tracks, otherwise, mapping), *warnings]
+    records = of_tracks(bag.name, tracks, role)
     if not any(record.known.any() for record in records):
         found = 'a velocity that never changes' if records else 'none'
         raise InputError(bag, '', 'a second and more with attitude, velocity and wrench', found)

@@ -1,13 +1,15 @@
 """Measured motion and command of a vehicle, each at its own times, and segments of them."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from auv_analysis.bag.tracks import Track, between_gaps, integral, usual_interval
 from auv_analysis.metrics.local_polynomials import ORDER, SMALLEST, variance, weights, windows
+from auv_analysis.metrics.pose_twist import turned
 from auv_dynamics.kernel.compile import plain
 from auv_dynamics.ros.interface import NANOSECONDS, WRENCH
 from auv_dynamics.vehicle.model import down
@@ -17,7 +19,9 @@ SMOOTHING = 0.4  # s, window of the local polynomials from which states are read
 PAUSE = 0.5  # s without a measurement of something that end no stretch where no gap was told
 SHORTEST = 1.0  # s of a record
 ROUNDED = 1e-12  # m/s, rad/s, rad
-JUMP, SELDOM = 0.1, 0.01  # rad between two samples, and of all samples: more often it is none
+JUMP = 0.02  # rad, m/s, rad/s between two samples: less is none
+BEYOND, NEARBY = 4.5, 2.0  # times the largest other change within s: less is none
+QUICK = 0.25  # s between samples that show a jump
 FEW = 3  # jumps whose times are named
 EVEN = 0.5  # of the mean interval: where all lie within, clocks jitter but no sample lacks
 
@@ -93,9 +97,7 @@ class Record:
         return np.where(found > ROUNDED, found, np.nan)  # what stands still tells no noise
 
 
-def of_tracks(
-    name: str, tracks: Mapping[str, Track], role: str = WRENCH, notes: list[str] | None = None
-) -> list[Record]:
+def of_tracks(name: str, tracks: Mapping[str, Track], role: str = WRENCH) -> list[Record]:
     """Records of the stretches of a bag that have attitude, velocity and command.
 
     Parameters
@@ -103,23 +105,17 @@ def of_tracks(
     name : of the bag
     tracks : role -> signal in NED and FSD, as of `tracks_of`
     role : of the wrench, which was commanded or acted
-    notes : gets where the attitude jumps, which ends a stretch
 
     """
     pose, twist, command = tracks['pose'], tracks['twist'], tracks[role]
-    origin = int(min(track.ns[0] for track in (pose, twist, command)))
+    origin = _origin(tracks, role)
     period = min(command.period, twist.period) / NANOSECONDS
     step = float(f'{np.clip(period, SHORTEST_STEP, LONGEST_STEP):.2g}')
     signals = [track.tolerant(PAUSE * NANOSECONDS) for track in (pose, twist, command)]
     seconds = [(track.ns - origin) / NANOSECONDS for track in signals]
     span = (max(int(track.ns[0]) for track in signals), min(int(track.ns[-1]) for track in signals))
-    jumps = _jumps(pose, twist)
-    if jumps and notes is not None:
-        times = ', '.join(f'{(after - origin) / NANOSECONDS:.4g}' for _, after in jumps[:FEW])
-        notes.append(f'the attitude jumps at {times} s'
-                     f'{" and later" * (len(jumps) > FEW)}, as by a reset: cut there')  # fmt: skip
     found = []
-    for first, last in _apart(between_gaps(*span, signals), jumps):
+    for first, last in between_gaps(*span, signals):
         begin, end = ((ns - origin) / NANOSECONDS for ns in (first, last))
         ns = origin + np.round(np.arange(begin, end + step / 2, step) * NANOSECONDS).astype(
             np.int64
@@ -135,29 +131,61 @@ def of_tracks(
     return long_enough(found)
 
 
-def _jumps(pose: Track, twist: Track) -> list[tuple[int, int]]:
-    """Stamps, ns, between which the attitude turns by far more than the angular velocity tells."""
-    rates = [np.interp(pose.ns, twist.ns[there], twist.rows[there, i]) for i in (3, 4, 5)
-             if (there := np.isfinite(twist.rows[:, i])).any()]  # fmt: skip
-    if len(rates) < 3 or len(pose.ns) < 2:
-        return []
-    speed = np.linalg.norm(rates, axis=0)
-    told = np.maximum(speed[1:], speed[:-1]) * np.diff(pose.ns) / NANOSECONDS
-    turned = np.linalg.norm(small_rotation(pose.rows[:-1, 3:], pose.rows[1:, 3:]), axis=1)
-    where = np.flatnonzero(turned > JUMP + 2.0 * told)
-    if len(where) > SELDOM * len(pose.ns):
-        return []  # it is the angular velocity that is wrong
-    return [(int(pose.ns[k]), int(pose.ns[k + 1])) for k in where]
+def cut_at_jumps(
+    tracks: Mapping[str, Track], role: str = WRENCH
+) -> tuple[dict[str, Track], list[str]]:
+    """Tracks whose attitude and velocity have a gap where either jumps, and a note on each.
+
+    Parameters
+    ----------
+    tracks : role -> signal in NED and FSD, as of `tracks_of`
+    role : of the wrench
+
+    """
+    pose, twist = tracks['pose'], tracks['twist']
+    found = {'attitude': _jumps(pose.ns, turned(pose.rows[:, 3:])),
+             'velocity': _jumps(twist.ns, twist.rows)}  # fmt: skip
+    resets, notes = np.concatenate(list(found.values())), []
+    for name, jumps in found.items():
+        at = (np.unique(jumps[:, 1]) - _origin(tracks, role)) / NANOSECONDS
+        times = ', '.join(f'{t:.4g}' for t in at[:FEW])
+        later = ' and later' * (len(at) > FEW)
+        if times:
+            notes.append(f'the {name} jumps at {times} s{later}, as by a reset: cut there')
+    cut = {name: replace(tracks[name], resets=resets) for name in ('pose', 'twist')}
+    return {**tracks, **cut}, notes
 
 
-def _apart(
-    spans: Iterable[tuple[int, int]], jumps: Sequence[tuple[int, int]]
-) -> Iterator[tuple[int, int]]:
-    """Spans of time, ns, without the times of jumps."""
-    for first, last in spans:
-        inside = [jump for jump in jumps if first <= jump[0] and jump[1] <= last]
-        edges = [first, *(ns for jump in inside for ns in jump), last]
-        yield from zip(edges[::2], edges[1::2], strict=True)
+def _origin(tracks: Mapping[str, Track], role: str) -> int:
+    """When times of records begin, ns."""
+    return int(min(tracks[name].ns[0] for name in ('pose', 'twist', role)))
+
+
+def _jumps(ns: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Stamps (r, 2), ns, between which a column of (n, k) changes far more than anywhere nearby.
+
+    What the motion around it tells is taken off. Noise, kinks and quanta recur within seconds, and
+    what one sample is off by the next one takes back. Where a column repeats its values, only its
+    changes are looked at. Over a long interval a vehicle itself may do what looks like a jump.
+    """
+    found = [np.zeros((0, 2), np.int64)]
+    for column in rows.T:
+        there = np.isfinite(column)
+        change, times = np.diff(column[there]), ns[there]
+        moved = np.flatnonzero(change)
+        apart = np.stack([times[moved], times[moved + 1]], axis=1)
+        length, change = np.ptp(apart, axis=1) / NANOSECONDS, change[moved]
+        period = usual_interval(apart[:, 1] / NANOSECONDS)
+        if period > QUICK:
+            continue
+        rate = uniform_filter1d(change, SMALLEST) / uniform_filter1d(length, SMALLEST)
+        change = np.abs(change - rate * length)
+        half = int(np.clip(NEARBY / 2 / period, SMALLEST // 2, len(change)))  # on either side
+        largest = maximum_filter1d(np.pad(change, half + 1), 2 * half + 1)
+        near = np.maximum(largest[: len(change)], largest[2 * half + 2 :])
+        allowed = BEYOND * near * np.maximum(length / period, 1.0)
+        found.append(apart[(change > np.maximum(allowed, JUMP)) & (length < QUICK)])
+    return np.concatenate(found)
 
 
 def long_enough(records: Sequence[Record]) -> list[Record]:

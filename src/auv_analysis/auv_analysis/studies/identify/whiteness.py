@@ -90,7 +90,7 @@ def told(rows: Sequence[Mapping[str, Any]], *, current: bool = False) -> str:
         f'The residuals are not white in {names}: in {worst["dof"]} '
         f'{number(100 * worst["slow"], 2)} % of their power lies below {SLOW:g} Hz, of white noise '
         f'{number(100 * worst["slow_if_white"], 2)} %; something slow acts that the model lacks'
-        f'{"" if current else ", as a current would (--free current)"}'
+        f'{"" if current else ", as a current would (--free current)"}: intervals may be too narrow'
     )
 
 

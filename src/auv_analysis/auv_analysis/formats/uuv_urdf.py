@@ -15,7 +15,6 @@ from auv_analysis.formats.imported import (
 )
 from auv_analysis.formats.xml_parts import (
     ENTRIES,
-    TURNED,
     inertia_entries,
     mass_of,
     numbers,
@@ -206,10 +205,10 @@ def _inertial(link: Element, model: Element, path: Path) -> tuple[dict[str, Any]
         R = rotation(quaternion(rpy))
     parts = {} if inertia is None else {str(part.tag): part.text or '' for part in inertia}
     texts = parts if inertia is None else parts | dict(inertia.attrib)
-    tensor = dict(zip(ENTRIES, inertia_entries(texts, R, path, 'inertial'), strict=True))
+    entries, traps = inertia_entries(texts, R, path, 'inertial')
     body = {
         'mass': mass_of(found),
         'center_of_gravity': point.tolist(),
-        'inertial': tensor,
+        'inertial': dict(zip(ENTRIES, entries, strict=True)),
     }
-    return body, [TURNED] * bool(np.any(np.eye(3) != R))
+    return body, traps

@@ -164,13 +164,16 @@ TURNED = 'link.inertial.pose: the tensor is turned into the axes of the link'
 ENTRIES = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
 
 
-def inertia_entries(texts: Mapping[str, str], R: np.ndarray, path: object, key: str) -> list[float]:
-    """Entries ixx ... izz of a tensor in the axes of its link, which R turns it into."""
+def inertia_entries(
+    texts: Mapping[str, str], R: np.ndarray, path: object, key: str
+) -> tuple[list[float], list[str]]:
+    """Entries ixx ... izz of a tensor in the axes of its link, and a note where R turns it."""
     xx, xy, xz, yy, yz, zz = (
         numbers(texts.get(name, '0'), 1, path, f'{key}.{name}')[0] for name in ENTRIES
     )
     turned = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
-    return [float(turned[i, j]) for i in range(3) for j in range(i, 3)]
+    entries = [float(turned[i, j]) for i in range(3) for j in range(i, 3)]
+    return entries, [TURNED] * bool(np.any(np.eye(3) != R))
 
 
 def put_rigid_body(
@@ -220,7 +223,6 @@ def link_inertia(draft: ImportedVehicle, link: Element, model: Element) -> None:
     mass = numbers(inertial.findtext('mass'), 1, path, f'{key}.mass')[0]
     r_G, R = pose_in_link(inertial, link, model, path, key)
     texts = {name: inertial.findtext(f'inertia/{name}', '0') for name in ENTRIES}
-    entries = inertia_entries(texts, R, path, key)
-    if np.any(np.eye(3) != R):
-        draft.traps.append(TURNED)
+    entries, traps = inertia_entries(texts, R, path, key)
+    draft.traps += traps
     put_rigid_body(draft, mass, r_G, entries, '<inertial> of the link')

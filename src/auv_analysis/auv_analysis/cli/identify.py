@@ -167,15 +167,11 @@ def _recordings(
     """Recordings to learn from, and those held out."""
     from auv_analysis.studies.identify.bags import on_one_step, parts, read_records
     from auv_analysis.studies.identify.identify import split
-    from auv_analysis.studies.identify.plausibility import check_rates
 
     mapping = topic_map(options)
 
     def records(bag: Path) -> list[Record]:
-        found = read_records(bag, vehicle, mapping, applied=options.applied, notes=notes)
-        for record in found:
-            check_rates(record)
-        return found
+        return read_records(bag, vehicle, mapping, applied=options.applied, notes=notes)
 
     bags = {bag.resolve(): bag for bag in options.bags}  # one that is named twice tells no more
     if Path(options.holdout).resolve() in bags:

@@ -16,6 +16,7 @@ from auv_analysis.bag.foreign_tracks import tracks_of, unknown_angles
 from auv_analysis.bag.tracks import Track
 from auv_analysis.output.progress import say
 from auv_analysis.output.text import join
+from auv_analysis.studies.identify.plausibility import check_rates
 from auv_analysis.studies.identify.record import Record, cut_at_jumps, long_enough, of_tracks
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.interface import GROUND_TRUTH, ODOM, WRENCH, WRENCH_APPLIED
@@ -72,6 +73,8 @@ def read_records(
     if not any(record.known.any() for record in records):
         found = 'a velocity that never changes' if records else 'none'
         raise InputError(bag, '', 'a second and more with attitude, velocity and wrench', found)
+    for record in records:
+        check_rates(record)
     return records
 
 

@@ -5,14 +5,13 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
-from auv_analysis.studies.identify.identified import Identified
+from auv_analysis.studies.identify.identified import BAND, Identified
 from auv_analysis.studies.identify.unknowns import inertia_unit
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.model import decompose, inverse_upper
 
 DRAWS = 400
 SAMPLES = 2000  # of the recording
-BAND = (0.025, 0.975)
 
 
 def couplings(found: Identified) -> dict[str, list[dict[str, Any]]]:
@@ -92,8 +91,6 @@ def signals_of(found: Identified) -> tuple[np.ndarray, np.ndarray]:
     nu, tau = [], []
     for record in found.training:
         every = max(len(record.command) * len(found.training) // SAMPLES, 1)
-        rows = np.arange(0, len(record.command), every)
-        states = record.states(record.start + record.step * (rows + 0.5))
-        nu.append(np.nan_to_num(states[:, 4:]))
-        tau.append(record.command[rows])
+        nu.append(np.nan_to_num(record.states(record.middles[::every])[:, 4:]))
+        tau.append(record.command[::every])
     return np.concatenate(nu), np.concatenate(tau)

@@ -271,11 +271,8 @@ def check_motion(records: Sequence[Record], noise: np.ndarray) -> None:
 
 def _noise(records: Sequence[Record]) -> np.ndarray:
     """(9,) as of `Record.noise`, of all recordings together."""
-    found = np.array([record.noise() for record in records])
-    known = np.isfinite(found)
-    squares = np.where(known, found, 0.0) ** 2
-    mean = squares.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    return np.where(known.any(axis=0), np.sqrt(mean), np.nan)
+    found = _rms([record.noise()[None] for record in records])
+    return np.where(found > 0.0, found, np.nan)
 
 
 def _still(records: Sequence[Record], noise: np.ndarray, u: Unknowns) -> list[Entry]:
@@ -403,7 +400,7 @@ def _bias(fit: Fit, halves: OutputError) -> np.ndarray:
     other = halves.fit(fit.unknowns, fit.theta, most=15, tolerance=1e-5)
     moved = fit.theta - other.theta
     seen = np.abs(moved) > SEEN * np.sqrt(np.diag(halves.covariance(other)))
-    return np.outer(moved, moved) if seen.any() else np.zeros((len(moved), len(moved)))
+    return float(seen.any()) * np.outer(moved, moved)
 
 
 def segment_length(problem: OutputError, u: Unknowns, theta: np.ndarray) -> float:

@@ -22,7 +22,8 @@ from auv_analysis.report.plots import (
 )
 from auv_analysis.studies.identify.identified import Identified
 from auv_analysis.studies.identify.prediction import by_name
-from auv_analysis.studies.identify.record import Segment, even_period
+from auv_analysis.studies.identify.record import Segment
+from auv_analysis.studies.identify.whiteness import at_even_rate
 from auv_dynamics.vehicle import DOFS
 
 LOOKS: dict[str, dict[str, Any]] = {
@@ -91,8 +92,7 @@ def _trace(found: Identified, pairs: Pairs) -> Drawn:
                 Curve(t[there], simulated[there], 'simulated' if first else '',
                       {'color': COLOURS[0], 'linewidth': 1.2}),
             ]  # fmt: skip
-        unit = SIGNALS['nu'].unit_of(i)
-        panels.append(Panel(curves, f'{unit}', dof))
+        panels.append(Panel(curves, SIGNALS['nu'].unit_of(i), dof))
     figure = time_panels(panels, across=2, height=1.35)
     caption = (
         'Velocity as measured, and as the identified model has it along segments that each start '
@@ -146,16 +146,11 @@ def _profiles(found: Identified) -> Drawn:
 def _residuals(found: Identified, pairs: Pairs) -> Drawn:
     """Spectra of the residuals: white ones are flat, at one."""
     figure, panels = small_multiples(6, 3, height=1.7, sharex=True, sharey=True)
-    rate = 1.0 / found.problem.step
     for i, (axes, dof) in enumerate(zip(panels, DOFS, strict=True)):
         spectra = []
-        for segment, e in pairs:
-            there = np.isfinite(segment.nu[:, i])
-            period = even_period(segment.at[there])
-            if period and there.sum() > 16:
-                own = rate / period
-                f, p = welch(e[there, i], own, nperseg=int(there.sum()))
-                spectra.append((f[1:], p[1:] * own / 2))
+        for e, period in at_even_rate(pairs, i, found.problem.step, 17):
+            f, p = welch(e, 1.0 / period, nperseg=len(e))
+            spectra.append((f[1:], p[1:] / period / 2))
         if spectra:
             top = min(float(f[-1]) for f, _ in spectra)  # all have it, whatever their rate
             f = min((f for f, _ in spectra), key=lambda f: float(f[0]))

@@ -70,7 +70,8 @@ def held_of(records: Sequence[Record], history: float) -> Held:
     )  # fmt: skip
     reach = float(horizons[-1])
     spacing = max(APART, total / MOST)
-    found, measured, blocks, offset = [], [], [], 0
+    found, measured, blocks = [], [np.zeros((0, len(horizons), 6))], [np.zeros(0, int)]
+    offset = 0
     for record in records:
         before = int(np.ceil(history / record.step))
         n = int(np.ceil(reach / record.step - ON_STEP))
@@ -92,8 +93,6 @@ def held_of(records: Sequence[Record], history: float) -> Held:
         number = ((begins - record.start) / min(BLOCK, total / FEWEST)).astype(int) + offset
         blocks.append(number)
         offset = int(number.max(initial=offset)) + 1
-    if not records:
-        return Held((), (), horizons, np.zeros((0, len(horizons), 6)), np.zeros(0, int))
     return Held(records, found, horizons, np.concatenate(measured), np.concatenate(blocks))
 
 
@@ -152,8 +151,7 @@ class BlackBox:
         return np.concatenate([np.nan_to_num(states[:, 4:]), down_of(states[:, :4])], axis=1)
 
     def _row(self, state: np.ndarray, record: Record, t: np.ndarray) -> np.ndarray:
-        middles = record.start + record.step * (np.arange(len(record.command)) + 0.5)
-        inputs = [smoothed_command(middles, record.command, t - lag) for lag in LAGS]
+        inputs = [smoothed_command(record.middles, record.command, t - lag) for lag in LAGS]
         return np.concatenate([state, *inputs, np.ones((len(t), 1))], axis=1)
 
     def predict(self, held: Held) -> np.ndarray:
@@ -161,18 +159,12 @@ class BlackBox:
         found = []
         for record, segments in zip(held.record, held.segments, strict=True):
             t = np.array([one.begin for one in segments])
-            x, steps = self._state(record, t), round(float(held.horizons[-1]) / BOX_STEP)
-            path = [x]
-            for k in range(steps):
+            x, path = self._state(record, t), []
+            for k in range(round(float(held.horizons[-1]) / BOX_STEP)):
                 x = x + self._row(x, record, t + k * BOX_STEP) / self.scale @ self.A
                 x = np.clip(x, -1e6, 1e6)
-                path.append(x)
-            at = held.horizons / BOX_STEP
-            first = np.minimum(at.astype(int), steps - 1)
-            share = (at - first)[:, None, None]
-            rows = np.array(path)
-            mixed = rows[first] * (1 - share) + rows[first + 1] * share
-            found.append(mixed[..., :6].swapaxes(0, 1))
+                path.append(x[:, :6])
+            found.append(_after(np.stack(path, axis=1), held.horizons / BOX_STEP))
         return np.asarray(np.concatenate(found) - held.measured)
 
 

@@ -56,6 +56,11 @@ class Record:
         return self.start + self.step * len(self.command)
 
     @property
+    def middles(self) -> np.ndarray:
+        """(n,) s, in the middle of each command."""
+        return self.start + self.step * (np.arange(len(self.command)) + 0.5)
+
+    @property
     def known(self) -> np.ndarray:
         """(6,) whether a velocity is ever measured."""
         return np.isfinite(self.velocity).any(axis=0)

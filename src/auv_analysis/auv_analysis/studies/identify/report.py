@@ -231,11 +231,17 @@ def prediction_results(
     return results
 
 
+def _judged(rows: Sequence[Mapping[str, Any]], predictor: str) -> Sequence[Mapping[str, Any]]:
+    """Rows of one predictor at horizons that tell of the model, else all of them."""
+    every = by_name(rows, predictor)
+    return [row for row in every if row['horizon'] >= JUDGED] or every
+
+
 def verdict_alone(vehicle: str, rows: Sequence[Mapping[str, Any]]) -> str:
     """Whether a vehicle predicts better than what knows nothing of it, in a sentence."""
     said = []
     for name in ('persistence', 'black box'):
-        some = [r for r in by_name(rows, name) if r['horizon'] >= JUDGED] or by_name(rows, name)
+        some = _judged(rows, name)
         better = [r for r in some if r['ratio_high'] < 1.0]
         worse = [r for r in some if r['ratio_low'] > 1.0]
         if len(better) == len(some):
@@ -257,9 +263,7 @@ def verdict(
     if not rows:
         text = 'Nothing was held out, or too little: how good the model is has not been tried'
         return f'{text}{reserved}.'
-    first = [row for row in by_name(rows, 'prior') if row['horizon'] >= JUDGED] or by_name(
-        rows, 'prior'
-    )
+    first = _judged(rows, 'prior')
     better = [row for row in first if row['ratio_high'] < 1.0]
     worse = [row for row in first if row['ratio_low'] > 1.0]
     row = (worse or better or first)[-1]

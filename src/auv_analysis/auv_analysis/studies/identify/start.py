@@ -135,7 +135,7 @@ class _Normal:
 
     def solve(self, delay: float) -> tuple[float, dict[str, np.ndarray]]:
         """Logarithm of the residuals, and coefficients, for one delay of the command."""
-        U = np.concatenate([_command(record, at - delay) for record, at in self.rows])
+        U = np.concatenate([smoothed(r.middles, r.command, at - delay) for r, at in self.rows])
         rest = (U - self.fixed).T
         right = np.einsum('ikn,ik->in', self.Y, rest, optimize=True)
         known, w = self.known.copy(), np.ones(6)
@@ -158,12 +158,6 @@ class _Normal:
             'D_quadratic': _with_diagonal(self.prior.D_quadratic, known[27:33]),
             'hydrostatics': known[33:],
         }
-
-
-def _command(record: Record, at: np.ndarray) -> np.ndarray:
-    """Wrench (k, 6) at some times, smoothed as velocities are."""
-    middles = record.start + record.step * (np.arange(len(record.command)) + 0.5)
-    return smoothed(middles, record.command, at)
 
 
 def _definite(M: np.ndarray, prior: np.ndarray) -> np.ndarray:

@@ -121,13 +121,8 @@ class Unknowns:
         for k, entry in enumerate(self.entries):
             step = entry.unit * theta[..., k]
             at: Any = (..., *entry.index)
-            if entry.group == 'M':
-                i, j = entry.index
-                R[at] = R[at] * np.exp(step) if i == j else R[at] + step
-            elif entry.group in ('lag', 'gain'):
-                own[entry.group][at] = own[entry.group][at] * np.exp(step)
-            else:
-                own[entry.group][at] = own[entry.group][at] + step
+            of = R if entry.group == 'M' else own[entry.group]
+            of[at] = of[at] * np.exp(step) if entry.is_log else of[at] + step
         own['M'] = s[:, None] * (R @ np.swapaxes(R, -1, -2)) * s
         return Coefficients(**own)
 
@@ -149,11 +144,11 @@ class Unknowns:
         found = self.coefficients(theta)
         return np.stack([getattr(found, e.group)[(..., *e.index)] for e in self.entries], axis=-1)
 
-    def gradient(self, theta: np.ndarray, function: Any = None) -> np.ndarray:
-        """Derivatives (m, n) of `values`, or of another function of theta, by central steps."""
-        h, function = 1e-5, function or self.values
+    def gradient(self, theta: np.ndarray) -> np.ndarray:
+        """Derivatives (n, n) of `values` by theta, by central steps."""
+        h = 1e-5
         steps = h * np.eye(len(theta))
-        return (function(theta + steps) - function(theta - steps)).T / (2 * h)
+        return (self.values(theta + steps) - self.values(theta - steps)).T / (2 * h)
 
     def precision(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Precision (n, n) of the prior near theta, and the gradient (n,) of its cost / 2."""

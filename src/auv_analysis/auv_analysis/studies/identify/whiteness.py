@@ -33,10 +33,7 @@ def whiteness(pairs: Sequence[tuple[Segment, np.ndarray]], step: float) -> list[
     """
     rows: list[dict[str, Any]] = []
     for i, dof in enumerate(DOFS):
-        some = [(e[there, i], period * step) for segment, e in pairs
-                for there in [np.isfinite(segment.nu[:, i])]
-                for period in [even_period(segment.at[there])]
-                if period and there.sum() > 2 * LAGS + 1]  # fmt: skip
+        some = at_even_rate(pairs, i, step, 2 * LAGS + 2)
         if some:
             rows.append({'dof': dof, **_of(some)})
     least = CERTAIN / max(len(rows), 1)
@@ -45,6 +42,21 @@ def whiteness(pairs: Sequence[tuple[Segment, np.ndarray]], step: float) -> list[
         is_slow = row['slow'] > MUCH * row['slow_if_white']
         row['verdict'] = 'white' if is_white else 'slow' if is_slow else 'coloured'
     return rows
+
+
+def at_even_rate(
+    pairs: Sequence[tuple[Segment, np.ndarray]], i: int, step: float, least: int
+) -> list[tuple[np.ndarray, float]]:
+    """Residuals of velocity i, and their period in s, of segments that have `least` and lack none.
+
+    Pairs and step as of `whiteness`.
+    """
+    return [
+        (e[there, i], period * step) for segment, e in pairs
+        for there in [np.isfinite(segment.nu[:, i])]
+        for period in [even_period(segment.at[there])]
+        if period and there.sum() >= least
+    ]  # fmt: skip
 
 
 def _of(some: Sequence[tuple[np.ndarray, float]]) -> dict[str, float]:

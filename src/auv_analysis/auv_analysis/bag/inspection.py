@@ -109,23 +109,16 @@ class Spacing:
         """Take the next stamps (n,), ns."""
         if not len(stamps):
             return
-        if self.last is not None:
-            stamps = np.insert(stamps, 0, self.last)
-        else:
-            self.first = int(stamps[0])
-            self.count += 1
-        self.count += len(stamps) - 1
-        self._span(int(stamps.min()), int(stamps.max()))
-        self.last = int(stamps[-1])
-        apart = np.diff(stamps)
-        values, counts = np.unique(apart, return_counts=True)
-        for value, count in zip(values.tolist(), counts.tolist(), strict=True):
-            self._note(value, count)
-        for i in np.argsort(apart)[-SHOWN:].tolist():
-            self._keep(int(apart[i]), int(stamps[i]))
+        part, apart = Spacing(), np.diff(stamps)
+        part.first, part.last, part.count = int(stamps[0]), int(stamps[-1]), len(stamps)
+        part.earliest, part.latest = int(stamps.min()), int(stamps.max())
+        values, counts = (found.tolist() for found in np.unique(apart, return_counts=True))
+        part.intervals = Counter(dict(zip(values, counts, strict=True)))
+        part.longest = [(int(apart[i]), int(stamps[i])) for i in np.argsort(apart)[-SHOWN:]]
+        self.join(part)
 
     def join(self, other: 'Spacing') -> None:
-        """Go on with what another file has of the topic."""
+        """Go on with what comes next of the topic."""
         if other.first is None or other.earliest is None or other.latest is None:
             return
         if self.last is not None:
@@ -135,16 +128,15 @@ class Spacing:
         else:
             self.first = other.first
         self.count += other.count
-        self._span(other.earliest, other.latest)
+        self.earliest = min(
+            other.earliest, other.earliest if self.earliest is None else self.earliest
+        )
+        self.latest = max(other.latest, other.latest if self.latest is None else self.latest)
         self.last = other.last
         for value, count in other.intervals.items():
             self._note(value, count)
         for interval, begin in other.longest:
             self._keep(interval, begin)
-
-    def _span(self, earliest: int, latest: int) -> None:
-        self.earliest = earliest if self.earliest is None else min(self.earliest, earliest)
-        self.latest = latest if self.latest is None else max(self.latest, latest)
 
     def _note(self, interval: int, count: int) -> None:
         if len(self.intervals) < MOST or interval in self.intervals:

@@ -96,37 +96,34 @@ def metadata(
     packed : whether each message is compressed by itself
 
     """
-    counts: dict[str, int] = {}
+    whole = FileExtent()
     for extent in extents:
         for topic, count in extent.counts.items():
-            counts[topic] = counts.get(topic, 0) + count
-    firsts = [extent.first for extent in extents if extent.first is not None]
-    lasts = [extent.last for extent in extents if extent.last is not None]
-    span = _span(min(firsts, default=None), max(lasts, default=None), sum(counts.values()))
+            if extent.first is not None and extent.last is not None:
+                whole.add(topic, extent.first, extent.last, count)
     return {
         'version': 9,
         'storage_identifier': 'mcap',
-        **span,
+        **_span(whole),
         'topics_with_message_count': [
-            {'topic_metadata': _about(definition), 'message_count': counts.get(definition.topic, 0)}
-            for definition in definitions
+            {'topic_metadata': _about(one), 'message_count': whole.counts.get(one.topic, 0)}
+            for one in definitions
         ],
         'compression_format': 'zstd' if packed else '',
         'compression_mode': 'message' if packed else '',
         'relative_file_paths': [extent.name for extent in extents],
-        'files': [
-            {'path': e.name, **_span(e.first, e.last, sum(e.counts.values()))} for e in extents
-        ],
+        'files': [{'path': extent.name, **_span(extent)} for extent in extents],
         'custom_data': None,
         'ros_distro': DISTRO,
     }
 
 
-def _span(first: int | None, last: int | None, count: int) -> dict[str, Any]:
+def _span(extent: FileExtent) -> dict[str, Any]:
+    first, last = extent.first or 0, extent.last or 0
     return {
-        'starting_time': {'nanoseconds_since_epoch': first or 0},
-        'duration': {'nanoseconds': (last or 0) - (first or 0)},
-        'message_count': count,
+        'starting_time': {'nanoseconds_since_epoch': first},
+        'duration': {'nanoseconds': last - first},
+        'message_count': sum(extent.counts.values()),
     }
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from auv_analysis.bag.limits import MOST_NAMED
 from auv_analysis.bag.metadata import TopicExtent
-from auv_analysis.bag.telemetry_log import LATEST, US, Message, count
+from auv_analysis.bag.telemetry_log import LATEST, US, Message, count, damage
 from auv_dynamics.files.errors import InputError
 
 GPS_EPOCH, WEEK = 315_964_800 - 18, 604_800  # s since 1970 less leap seconds, s
@@ -106,7 +106,7 @@ class OnboardLog:
         for tally in found.values():  # definitions stand before the first time
             times = tally.first, tally.last
             tally.first, tally.last = ((max(time, begin) + self._epoch) * US for time in times)
-        notes += self._said_of_damage()
+        notes += damage(self.path, self._damaged, 'records')
         return found
 
     def messages(self, topics: Collection[str], notes: list[str]) -> Iterator[Message]:
@@ -115,11 +115,7 @@ class OnboardLog:
         for record in self._records():
             if record.format.name in names and (topic := self._topic(record)) in topics:
                 yield topic, (record.time + self._epoch) * US, self._message(record)
-        notes += self._said_of_damage()
-
-    def _said_of_damage(self) -> list[str]:
-        damaged = f'{self.path.name}: damaged: {self._damaged} bytes are no records'
-        return [damaged] if self._damaged else []
+        notes += damage(self.path, self._damaged, 'records')
 
     def _message(self, record: Record) -> SimpleNamespace:
         body = self.data[record.start + 3 : record.start + record.format.length]

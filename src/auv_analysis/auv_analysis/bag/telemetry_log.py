@@ -47,6 +47,11 @@ def count(found: dict[Any, TopicExtent], kind: Any, time: int, path: Path) -> No
     found[kind].add(time)
 
 
+def damage(path: Path, count: int, what: str) -> list[str]:
+    """A note on bytes of a log that are no messages or records; none where all are."""
+    return [f'{path.name}: damaged: {count} bytes are no {what}'] if count else []
+
+
 class TelemetryLog:
     """A .tlog: what a ground station received, each message behind its time in us.
 
@@ -93,8 +98,7 @@ class TelemetryLog:
             elif frame.number == parameters:
                 self._note_parameter(frame)
         self._vehicle = self._chosen(found, heard, notes)
-        if self._damaged:
-            notes.append(self._said_of_damage(self._damaged))
+        notes += damage(self._path, self._damaged, 'messages')
         return {
             topic: tally
             for (system, component, topic), tally in sorted(found.items())
@@ -148,11 +152,7 @@ class TelemetryLog:
                 yield topic, frame.stamp * US, message
         if wrong:
             notes.append(f'{self._path.name}: {wrong} messages left out, whose checksum is wrong')
-        if self._damaged:
-            notes.append(self._said_of_damage(self._damaged))
-
-    def _said_of_damage(self, count: int) -> str:
-        return f'{self._path.name}: damaged: {count} bytes are no messages'
+        notes += damage(self._path, self._damaged, 'messages')
 
     def _topic(self, frame: Frame) -> str:
         """Type of a message; behind it which port, sensor or value, where that is not number 0."""

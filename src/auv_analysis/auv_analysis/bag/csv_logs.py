@@ -250,7 +250,7 @@ class Table:
         try:
             return float(cell)
         except ValueError:
-            if _is_nothing(cell):
+            if cell.strip().lower() in NOTHING:
                 return np.nan
             if self._separator == ';':  # beside which decimals may have a comma
                 return float(cell.replace(',', '.'))
@@ -319,10 +319,6 @@ class Block:
             with contextlib.suppress(ValueError):
                 found[name] = self.table.number(cell)
         return SimpleNamespace(**found | {'header': None, 'child_frame_id': ''})
-
-
-def _is_nothing(cell: str) -> bool:
-    return cell.strip().lower() in NOTHING
 
 
 def _is_comment(line: str) -> bool:

@@ -7,7 +7,6 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING
-from functools import partial
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -244,7 +243,7 @@ class MessageReader:
         getters: list[Callable[[Any], Any]] = []
         for key, told in zip(keys, self._paths, strict=True):
             if not isinstance(told, str):
-                getters.append(partial(_constant, float(told)))
+                getters.append(lambda _, number=float(told): number)
                 continue
             path = told.removeprefix('-')
             get = getter(message, path)
@@ -317,10 +316,6 @@ class MessageReader:
         for name, column in by_name.items():
             found[:, order.index(name)] = column
         return found
-
-
-def _constant(number: float, _: Any) -> float:
-    return number
 
 
 def getter(message: Any, path: str) -> Callable[[Any], Any]:

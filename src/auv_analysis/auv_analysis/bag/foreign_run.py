@@ -9,7 +9,6 @@ jump: a rate of nu alone would smear a step of tau into F. Where no wrench was r
 tau = 0 is the wrench that the motion needed: M nu_dot + C nu + D nu + g.
 """
 
-import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -49,6 +48,7 @@ from auv_analysis.metrics.local_polynomials import (
     variance,
 )
 from auv_analysis.runs.run import FOREIGN, Run
+from auv_analysis.scenario.scaling import UNFIT
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import read_text
@@ -312,7 +312,7 @@ def _run(
 
 def _name_of(bag: Path) -> str:
     """Name of a bag as a word that may name files."""
-    return re.sub(r'[^A-Za-z0-9_.+-]', '_', bag.name if bag.is_dir() else bag.stem)[:100]
+    return UNFIT.sub('_', bag.name if bag.is_dir() else bag.stem)[:100]
 
 
 def _sampled(track: Track, base: TimeBase) -> np.ndarray:

@@ -223,8 +223,7 @@ class Inspection:
     @property
     def count(self) -> int:
         """Number of messages that can be kept."""
-        known = self.definitions
-        return sum(s.count for c, s in self.spacings.items() if known.channel(c) is not None)
+        return sum(self.extent('').counts.values())
 
     @property
     def messages_lost(self) -> int | None:

@@ -306,16 +306,13 @@ class FileReader:
         topic = self._file.channels[channel].topic
         return self._contents.names.get(topic, topic)
 
-    def _is_read(self, topic: str) -> bool:
-        space = self._contents.namespace
-        return space is None or namespace_of(topic).strip('/') == space.strip('/')
-
     def _channel(self, channel: Channel) -> None:
         schema = self._file.schema_of(channel)
         kind = schema.name if schema else ''
         self._contents.types[channel.topic] = kind
-        topic = self._topic(channel.id)
-        if self._decode and role_of(topic) in READERS and self._is_read(topic):
+        topic, space = self._topic(channel.id), self._contents.namespace
+        is_read = space is None or namespace_of(topic).strip('/') == space.strip('/')
+        if self._decode and role_of(topic) in READERS and is_read:
             check_type(self._path, topic, kind)
             self._decoders.add(channel, schema)
         elif self._decode and (topic, kind) == (interface.DIAGNOSTICS, HEALTH):

@@ -114,10 +114,9 @@ def _energy(table: pa.Table) -> Drawn:
 
 def _ranking(ranking: Ranking) -> Drawn:
     title = 'Ranking'
+    if not ranking.measures:
+        return None, title, f'{title}: no measure differs between the runs.'
     labels = [measure.label for measure in ranking.measures]
-    caption = f'{title} by the measures that sum up a run, rank 1 is the smallest value. '
-    if len(ranking.runs) <= MOST_LINES:
-        return _parallel(ranking, labels), title, caption + 'Equal values share a rank.'
     widest = float(np.nanmax(np.abs(ranking.ratios), initial=1.0))
     end = min(np.ceil(widest), 4.0)
     grid = HeatMap(
@@ -131,27 +130,12 @@ def _ranking(ranking: Ranking) -> Drawn:
     figure = plots.heat_map(ranking.runs, [grid])
     axes = figure.axes[0]
     axes.tick_params(axis='x', labelrotation=90, labelsize='small')
-    text = (
+    caption = (
         f'{title}: each measure as a multiple of its median over the runs where it is not zero, in '
         'powers of two: 1 is twice the median, −1 half of it; crossed out: none, or zero. '
         'Sorted by the mean rank.'
     )
-    return figure, title, text
-
-
-def _parallel(ranking: Ranking, labels: Sequence[str]) -> Figure:
-    """Ranks of each run along the measures."""
-    figure = plots.new_figure(1.6 + 0.24 * len(ranking.runs))
-    axes = figure.subplots()
-    places = np.arange(len(labels))
-    for i, run in enumerate(ranking.runs):
-        style = look(i)
-        axes.plot(places, ranking.ranks[i], marker='o', markersize=4, label=run, **style)
-    axes.set(ylim=(len(ranking.runs) + 0.4, 0.6), xlim=(-0.3, len(labels) - 0.7), ylabel='rank')
-    axes.set_xticks(places, labels, rotation=90, fontsize='small')
-    axes.set_yticks(range(1, len(ranking.runs) + 1))
-    figure.legend(loc='outside right upper', handlelength=2.6)
-    return figure
+    return figure, title, caption
 
 
 def still_to_come(run: RunDigest) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""The controller node: what it answers, what it refuses, how it lets go."""
+"""The controller node: what it answers, what it refuses, how it disengages."""
 
 import json
 import math
@@ -249,7 +249,7 @@ def test_mistakes_with_set_points_are_explained() -> None:
     assert 'begins: tracks cmd_vel with gvc in real time' in output
     assert 'ends with exit code 0: tracks cmd_vel' in output
     assert 'ERROR' not in output, 'a normal start and end'
-    assert 'takes over' not in output, 'it never was in charge'
+    assert 'engages' not in output, 'it never was in charge'
 
 
 def test_stamps_of_set_points_without_a_time_are_explained() -> None:

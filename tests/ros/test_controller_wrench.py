@@ -283,15 +283,15 @@ def test_what_is_missing_at_an_activation_is_told_and_leaves_it_inactive(made, v
 
 def test_an_error_while_it_leaves_still_leaves_no_wrench(made, vehicle, monkeypatch) -> None:
     node = controller(made, vehicle, 'gvc', **BESIDE)
-    let_go, calls = node._let_go, []
+    disengage, calls = node._disengage, []
 
     def first_fails() -> None:
-        calls.append('let go')
+        calls.append('disengaged')
         if len(calls) == 1:
             raise KeyError('what nobody thought of')
-        let_go()
+        disengage()
 
-    monkeypatch.setattr(node, '_let_go', first_fails)
+    monkeypatch.setattr(node, '_disengage', first_fails)
     assert node.trigger_deactivate() == TransitionCallbackReturn.ERROR
     made.until(lambda: made.heard['wrench'], 'a zero wrench')
     assert by_hand.six_of(made.heard['wrench'][-1]) == [0.0] * 6
@@ -425,8 +425,8 @@ def test_silence_in_real_time_gives_zero_wrench_is_explained_and_it_comes_back(
     ship.gets(tau)
     assert node.trigger_shutdown() == TransitionCallbackReturn.SUCCESS
     made.until(lambda: by_hand.six_of(made.heard['wrench'][-1]) == zero, 'a zero wrench')
-    told = re.findall('takes over|lets go', capfd.readouterr().err)
-    assert told == ['takes over', 'lets go'] * (len(told) // 2), 'each change is said, and once'
+    told = re.findall('engages|disengages', capfd.readouterr().err)
+    assert told == ['engages', 'disengages'] * (len(told) // 2), 'each change is said, and once'
     assert len(told) >= 8
 
 
@@ -452,7 +452,7 @@ def test_an_answer_that_is_held_back_is_zero_where_the_controller_leaves(
     made.until(lambda: node._held is None, 'nothing held back')
     assert {tuple(by_hand.six_of(message)) for message in made.heard['wrench']} == {(0.0,) * 6}
     assert by_hand.ns_of(made.heard['wrench'][0]) == 3 * STEP
-    assert not re.search('takes over|lets go', capfd.readouterr().err)
+    assert not re.search('engages|disengages', capfd.readouterr().err)
 
 
 def test_in_lock_step_the_law_goes_on_from_an_answer_that_is_held_back(made, vehicle) -> None:

@@ -48,7 +48,7 @@ def test_change_the_law(tmp_path: Path) -> None:
 def test_stub_driver_is_controlled(tmp_path: Path) -> None:
     for _ in range(3):
         output, errors = run('stub_driver.py', '--seconds', '3', cwd=tmp_path)
-        if 'lets go: no ' not in errors:  # a watchdog: the machine stood still
+        if 'disengages: no ' not in errors:  # a watchdog: the machine stood still
             break
     reached = float(re.search(r'surge ([\d.]+)', output)[1])
     assert reached == pytest.approx(0.4, abs=0.05)

@@ -166,7 +166,7 @@ class OpenLoop:
     tau, f : (n, 6) wrench and estimate, N and N m, body frame
     refused : odometry and set-points that were not used, and wrenches that the law had not
     trouble : why, of the first one
-    ramps : (n,) whether an answer may be on the ramp of a law that takes over; None: none is
+    ramps : (n,) whether an answer may be on the ramp of a law that engages; None: none is
     notes : what of the recording was left out or is missing
 
     """
@@ -294,7 +294,7 @@ class _Course:
     """When the recorded law was in charge, by its own wrenches and estimates.
 
     In real time odometry may come while nobody answers, before activation or lost on the way to
-    the controller alone, and while a watchdog has let go: the law's integrals do not know it.
+    the controller alone, and while a watchdog disengages it: the law's integrals do not know it.
 
     Parameters
     ----------

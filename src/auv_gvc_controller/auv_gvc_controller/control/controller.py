@@ -6,14 +6,14 @@ from auv_gvc_controller.control.odometry_guard import UNTIMED, ZERO, Now, Odomet
 from auv_gvc_controller.control.sampled import SampledLaw
 from auv_gvc_controller.control.setpoint_buffer import Reference, ReferenceFilter, SetpointBuffer
 
-FEWEST = 10  # answers over which a law takes over at least, however rare they are
+FEWEST = 10  # answers over which a law engages at least, however rare they are
 
 
 class OutputStage:
     """The last stage before a wrench is published.
 
-    A law that takes over, at activation, after a watchdog or a reset, comes in over the ramp from
-    the wrench that was published last; one that lets go is taken back over it. So neither is a
+    A law that engages, at activation, after a watchdog or a reset, comes in over the ramp from
+    the wrench that was published last; one that disengages is taken back over it. So neither is a
     jump for the vehicle.
 
     Parameters
@@ -93,7 +93,7 @@ class OutputStage:
 
 @dataclass(frozen=True)
 class Answer:
-    """The controller's answer to an odometry: wrench and estimate, and why it lets go."""
+    """The controller's answer to an odometry: wrench and estimate, and why it disengages."""
 
     ns: int
     tau: tuple[float, ...]
@@ -103,7 +103,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Timeouts:
-    """Real time: after what the law lets go, s.
+    """Real time: after what the law disengages, s.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ class VelocityController:
     Attributes
     ----------
     watchdog : why the law is not in charge, empty while it is
-    trips : how often it had to let go
+    trips : how often it had to disengage
 
     """
 
@@ -225,7 +225,7 @@ class VelocityController:
         try:
             tau, f = self._law.sample(t, dt, x[7:], x[3:7], nu_d, nu_d_dot)
         except ArithmeticError as error:
-            return self._let_go(ns, str(error), now)
+            return self._disengage(ns, str(error), now)
         self.watchdog, self._in_charge = '', True
         return Answer(ns, self._output.follow(tau, self._clock(ns, now)), f)
 
@@ -254,7 +254,7 @@ class VelocityController:
         ns, silent = self._guard.last or 0, '' if self._exact else self._silent(now)
         if silent and self._in_charge:
             return self._trip(ns, silent, now)
-        return self._let_go(ns, self.watchdog, now) if self.watchdog else None
+        return self._disengage(ns, self.watchdog, now) if self.watchdog else None
 
     @property
     def newest(self) -> int | None:
@@ -290,9 +290,9 @@ class VelocityController:
         """Let go because of a watchdog: in real time the integrals do not outlive it."""
         if self._timeouts is not None:
             self._law.reset()
-        return self._let_go(ns, trouble, now)
+        return self._disengage(ns, trouble, now)
 
-    def _let_go(self, ns: int, trouble: str, now: Now) -> Answer:
+    def _disengage(self, ns: int, trouble: str, now: Now) -> Answer:
         self._waiting = None
         self._bridge = True
         self.trips += self._in_charge

@@ -82,7 +82,7 @@ class ControllerSettings:
         'largest wrench; must be known in real time', 'limits.wrench'
     )
     limits_wrench_rate: tuple[float, ...] = _six('per s, its fastest change', 'limits.wrench_rate')
-    ramp: float = _number(0.2, 's, real time: over which a law takes over and lets go')
+    ramp: float = _number(0.2, 's, real time: over which a law engages and disengages')
     stamp_clock: str = setting(
         AUTO,
         "that odometry is stamped with: the node's own (ros), a free-running one (own), "

@@ -318,7 +318,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Leave the vehicle without a wrench."""
-        self._let_go()
+        self._disengage()
         self._active = False
         return SUCCESS
 
@@ -377,18 +377,18 @@ class ControllerNode(BulkMixin, LifecycleNode):
             self._tell(answer.trouble)
         elif self._follows:
             self._follows = False
-            self.get_logger().info('lets go: zero wrench')
+            self.get_logger().info('disengages: zero wrench')
         self._publish_wrench(answer.ns, answer.tau)
         self._publish_estimate(answer.ns, answer.f)
         self.graph.latest_ns = answer.ns
 
     def _tell(self, trouble: str) -> None:
-        """Log when the law takes over, and when it lets go."""
+        """Log when the law engages, and when it disengages."""
         if trouble and self._settings.lockstep:  # there nothing is late: something has failed
             self.graph.complain(trouble)
         elif self._follows == bool(trouble):
             self._follows = not trouble
-            self.get_logger().info(f'lets go: {trouble}' if trouble else 'takes over')
+            self.get_logger().info(f'disengages: {trouble}' if trouble else 'engages')
 
     def _trouble(self) -> Health:
         """The present problem, for as long as it lasts."""
@@ -397,7 +397,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         return self._idle.health(self._controller.watchdog, self._controller.newest)
 
     def _watch(self) -> None:
-        """Say what is held back; in real time, let go when odometry or set-points stay away."""
+        """Say what is held back; in real time, disengage when odometry or set-points stay away."""
         if self._active:
             self._say(self._controller.watch(self._now()))
         if self._held is not None:
@@ -412,7 +412,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         watchdog = {'watchdog': c.watchdog or 'none', 'watchdog trips': c.trips}
         return {'active': True, **watchdog, **self._settings.told}
 
-    def _let_go(self) -> None:
+    def _disengage(self) -> None:
         if not self._active:
             return
         waited_for = self._held is not None or self._controller.unanswered is not None
@@ -427,7 +427,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
 
     def close(self) -> None:
         """Leave the vehicle without a wrench, and see that it hears of it."""
-        self._let_go()
+        self._disengage()
         self.graph.publishers[topics.WRENCH.name].wait_for_all_acked(Duration(seconds=0.5))
 
 

@@ -100,13 +100,14 @@ def check_hold(scenario: Scenario, hold: Hold) -> None:
         raise InputError(scenario.path, scenario.sampled[0], expected, "hold 'continuous'")
 
 
-def blocks(scenario: Scenario) -> Iterator[tuple[StepBlock, Tables]]:
+def blocks(scenario: Scenario, hold: Hold) -> Iterator[tuple[StepBlock, Tables]]:
     """Inputs of a run that are known before it starts, a block of steps at a time."""
     tableau, count = TABLEAUS[scenario.data['integrator']], scenario.steps + 1
     noise, faults = scenario.noise(), scenario.fault_rows()
     for first in range(0, count, BLOCK):
         t = stage_times(tableau, scenario.step, first, min(BLOCK, count - first))
-        yield StepBlock(t, scenario.step, first, count - 1), tables(scenario, t, noise, faults)
+        known = tables(scenario, t, noise, faults, hold)
+        yield StepBlock(t, scenario.step, first, count - 1), known
 
 
 def tables(
@@ -114,12 +115,14 @@ def tables(
     t: np.ndarray,
     noise: SensorNoise | None = None,
     faults: FaultRows | None = None,
+    hold: Hold = 'continuous',
 ) -> Tables:
     """Set-points, disturbance, current and the next rows of noise and faults at t (T, s)."""
     rows = np.zeros((0, WIDTH)) if noise is None else noise.rows(len(t))
     failing = np.zeros((0, 0)) if faults is None else faults.rows(len(t))
     known = scenario.uncertainty.tables(t)
-    return Tables(reference(scenario.setpoint, t), *known, rows, failing)
+    asked = reference(scenario.setpoint, t[:, :1] if hold == 'zoh' else t)
+    return Tables(asked, *known, rows, failing)
 
 
 def reference(setpoint: Setpoint, t: np.ndarray) -> np.ndarray:
@@ -136,7 +139,7 @@ def _run_kernel(
     motion, work = (with_batch_axis(part) for part in at_start(scenario, loop))
     kept = with_batch_axis(log)
     nu_d_dot, vehicle = np.empty((scenario.steps + 1, 6)), with_batch_axis(loop)
-    for grid, known in each(blocks(scenario), scenario.steps // BLOCK + 1):
+    for grid, known in each(blocks(scenario, hold), scenario.steps // BLOCK + 1):
         nu_d_dot[grid.first : grid.first + len(grid.t)] = known.reference[:, 0, 6:]
         with np.errstate(all='ignore'):
             tables_of = with_batch_axis(known)

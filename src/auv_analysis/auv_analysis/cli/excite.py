@@ -4,18 +4,11 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from auv_analysis.cli.arguments import VEHICLE, add_no_report, add_results, number, whole
 
-if TYPE_CHECKING:
-    from auv_analysis.studies.excite.drive import Bounds
-    from auv_dynamics.vehicle.vehicle import Vehicle
-
-TILT = 0.8  # rad
-SPEED = 0.5  # m/s
 DEPTH = 10.0  # m
-SHARE = 1 / 3  # of what the thrusters give on one axis alone, as all are driven at once
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -36,7 +29,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     text = 'largest wrench, 1 or 6 numbers, N and N m; 0: an axis that is not driven; default: a '
     text += 'third of what the thrusters give, else what moves the vehicle at the speed'
     command.add_argument('--limit', type=number(at_least=0.0), nargs='+', metavar='N', help=text)
-    text = f'largest speed, m/s; default: {SPEED:g}, or more where vehicles near the file drift as '
+    text = 'largest speed, m/s; default: 0.5, or more where vehicles near the file drift as '
     text += 'fast'
     command.add_argument('--speed', type=positive, metavar='M/S', help=text)
     text = 'largest angular rate, rad/s; default: twice the number of the speed, or more where '
@@ -70,22 +63,16 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """What to drive so that a model can be identified."""
     import os
-    from contextlib import suppress
-    from dataclasses import replace
+    from functools import partial
 
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices: threads only wait
+    import numpy as np
+
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import bar, say, waiting
     from auv_analysis.scenario.scaling import plain_name
-    from auv_analysis.studies.excite.drive import Request
-    from auv_analysis.studies.excite.excite import (
-        LENGTHS,
-        Excited,
-        Tick,
-        excite,
-        unexcited,
-        usual_step,
-    )
+    from auv_analysis.studies.excite.drive import Request, bounds_of
+    from auv_analysis.studies.excite.excite import LENGTHS, planned, usual_step
     from auv_analysis.studies.excite.report import (
         SCENARIO,
         print_results,
@@ -94,41 +81,33 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         write_report,
     )
     from auv_analysis.studies.identify.unknowns import DEFAULT
-    from auv_dynamics.files.errors import FailedError
+    from auv_dynamics.files.errors import InputError
     from auv_dynamics.files.shipped import shipped
     from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
     vehicle = load_vehicle(options.vehicle)
-    bounds = bounds_of(options, vehicle)
-    step = options.step or usual_step(vehicle, bounds)
+    if options.limit is not None and len(options.limit) not in (1, 6):
+        raise InputError('--limit', '', '1 or 6 numbers', f'{len(options.limit)} numbers')
+    wrench = None if options.limit is None else np.broadcast_to(np.array(options.limit), 6)
+    room = np.array(options.tank or (np.inf, np.inf, options.depth))
+    bounds = partial(bounds_of, vehicle, room, wrench, options.speed, options.rate)
     lengths = [options.duration] if options.duration else LENGTHS
-
-    def request_of(duration: float) -> Request:
-        request = Request(
-            options.vehicle, bounds, round(round(duration / step) * step, 9), step,
-            (*DEFAULT, *options.free), options.fixed, options.lag, options.velocity_noise,
-            options.attitude_noise, options.spread, options.closed_loop, options.seed,
-        )  # fmt: skip
-        if request.closed:
-            return request
-        return replace(request, bounds=bounds_of(options, vehicle, *unexcited(request)))
-
-    def search(tick: Tick) -> Excited:
-        for duration in lengths[:-1]:
-            with suppress(FailedError):
-                return excite(request_of(duration), tick)
-        return excite(request_of(lengths[-1]), tick)
-
+    request = Request(
+        options.vehicle, bounds(), lengths[0], options.step or usual_step(vehicle, bounds()),
+        (*DEFAULT, *options.free), options.fixed, options.lag, options.velocity_noise,
+        options.attitude_noise, options.spread, options.closed_loop, options.seed,
+    )  # fmt: skip
     out = options.out or Path('runs') / plain_name('excite', vehicle.name)
     with results_folder(
         out, overwrite=options.overwrite, inputs=[shipped('vehicles', options.vehicle)]
     ) as folder:
         with bar() as shown:
             task = shown.add_task('phases', total=1)
-            found = search(
-                lambda text, share: shown.update(task, description=text, completed=share)
-            )
-        if not options.duration and found.request.duration < lengths[0] - step:
+            found = planned(
+                request, lengths, bounds,
+                lambda text, share: shown.update(task, description=text, completed=share),
+            )  # fmt: skip
+        if found.request.duration < lengths[0] - request.step:
             say(f'{found.request.duration:g} s: in longer recordings the motion leaves its bounds')
         if found.request.clipped:
             say('the law also asks for axes that nothing drives: record wrench_applied, identify '
@@ -142,33 +121,3 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         if not options.json:
             print_results(results, out)
     return results.to_json()
-
-
-def bounds_of(
-    options: argparse.Namespace, vehicle: Vehicle, speed: float = SPEED, rate: float = 0.0
-) -> Bounds:
-    """What the motion must stay within; m/s and rad/s that must be allowed where none is given."""
-    import numpy as np
-
-    from auv_analysis.studies.excite.drive import Bounds
-    from auv_dynamics.files.errors import InputError
-    from auv_dynamics.vehicle import DOFS
-
-    speed = options.speed or max(SPEED, speed)
-    rate = options.rate or max(2.0 * speed, rate)
-    if options.limit is not None and len(options.limit) not in (1, 6):
-        raise InputError('--limit', '', '1 or 6 numbers', f'{len(options.limit)} numbers')
-    if options.limit is not None:
-        wrench = np.broadcast_to(np.array(options.limit), 6)
-    elif vehicle.thrusters is not None:
-        driven = [dof not in vehicle.thrusters.unactuated() for dof in DOFS]
-        wrench = SHARE * vehicle.thrusters.alone().min(axis=0) * driven
-    else:
-        nu = np.repeat([speed, rate], 3)
-        tilted = np.array([0.0, 0.0, 0.0, 0.5 * TILT, 0.5 * TILT, 0.0])
-        still = vehicle.g(np.zeros(6))
-        turning = np.abs(vehicle.g(tilted) - still)
-        wrench = np.diag(vehicle.M) * nu + np.abs(np.diag(vehicle.D(nu)) * nu)
-        wrench = wrench + turning + np.abs(still)
-    room = np.array(options.tank or (np.inf, np.inf, options.depth))
-    return Bounds(np.asarray(wrench, float), speed, rate, TILT, room)

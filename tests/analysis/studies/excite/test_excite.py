@@ -13,7 +13,6 @@ from helpers.sea_trials import recorded
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.cli import main
-from auv_analysis.cli.excite import bounds_of
 from auv_analysis.output.folder import listed_in, results_folder
 from auv_analysis.report.results import Results
 from auv_analysis.studies.excite import excite as searching
@@ -23,6 +22,7 @@ from auv_analysis.studies.excite.drive import (
     Family,
     Motion,
     Request,
+    bounds_of,
     motion_of,
     scenario_in_memory,
     scenario_of,
@@ -45,6 +45,7 @@ from auv_dynamics.plant.disturbance import Harmonics
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
 TANK = (12.0, 12.0, 6.0)
+PHASE = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, (6, 6))
 VEHICLE = 'bluerov2_heavy'
 
 
@@ -103,19 +104,19 @@ def test_results_take_the_place_of_earlier_ones(excited, tmp_path: Path) -> None
 
 def test_a_vehicle_without_thrusters_has_more_than_what_holds_it_still() -> None:
     vehicle = load_vehicle('herman2018')
-    options = main.parser(['excite']).parse_args(['excite', 'herman2018'])
     still = abs(vehicle.g(np.zeros(6)))
     assert still[2] > 0.0
     nu = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 1.0])  # what it gains in a second, against its drag
     moving = np.diag(vehicle.M) * nu + np.diag(vehicle.D(nu)) * nu
     tilted = abs(vehicle.g(np.array([0.0, 0.0, 0.0, 0.4, 0.4, 0.0])) - vehicle.g(np.zeros(6)))
-    np.testing.assert_allclose(bounds_of(options, vehicle).wrench, moving + tilted + still)
+    bounds = bounds_of(vehicle, np.full(3, np.inf), None, None, None)
+    np.testing.assert_allclose(bounds.wrench, moving + tilted + still)
 
 
 def test_what_the_command_line_asks_for_is_what_is_searched(tmp_path, monkeypatch) -> None:
     asked: list[Request] = []
 
-    def search(request: Request, _: object) -> None:
+    def search(request: Request, *_: object) -> None:
         asked.append(request)
         raise InputError('enough', '', 'no more', 'another')
 
@@ -125,17 +126,17 @@ def test_what_the_command_line_asks_for_is_what_is_searched(tmp_path, monkeypatc
         '--velocity-noise 0.01 --attitude-noise 0.02 --spread 0.2 --closed-loop --seed 7 '
         f'--free M --fixed lag --limit 6 5 4 3 2 1 --out {tmp_path / "out"}'
     )
-    for arguments in (line, f'excite bluerov2 --speed 0.4 --depth 9 --out {tmp_path / "out"}'):
+    for arguments in (line, f'excite bluerov2 --speed 0.4 --depth 9 --out {tmp_path / "out"}',
+                      f'excite bluerov2 --limit 6 --out {tmp_path / "out"}'):  # fmt: skip
         with pytest.raises(SystemExit):
             main.main(arguments.split())
-    one, other = asked
+    one, other, alike = asked
     assert (one.given, one.duration, one.step, one.lag) == ('bluerov2', 30.0, 0.1, 0.3)
     assert (one.velocity_noise, one.attitude_noise, one.spread) == (0.01, 0.02, 0.2)
     assert (one.closed, one.seed, one.free[-1], one.fixed) == (True, 7, 'M', ['lag'])
     assert (one.bounds.speed, one.bounds.rate, one.bounds.room.tolist()) == (0.4, 0.7, [3, 4, 5])
     assert one.bounds.wrench.tolist() == [6.0, 5.0, 4.0, 3.0, 2.0, 1.0]
-    alike = main.parser(['excite']).parse_args(['excite', 'bluerov2', '--limit', '6'])
-    assert bounds_of(alike, load_vehicle('bluerov2')).wrench.tolist() == [6.0] * 6
+    assert alike.bounds.wrench.tolist() == [6.0] * 6
     assert (other.bounds.rate, other.bounds.room.tolist()) == (0.8, [np.inf, np.inf, 9.0])
     thrusters = load_vehicle('bluerov2').thrusters
     assert np.flatnonzero(other.bounds.wrench == 0) == [4]  # surge and heave make pitch
@@ -352,7 +353,7 @@ def test_a_vehicle_that_drifts_gets_a_shorter_recording_and_one_that_swings_a_hi
 ) -> None:
     asked: list[Request] = []
 
-    def search(request: Request, _: object) -> None:
+    def search(request: Request, *_: object) -> None:
         asked.append(request)
         raise FailedError('it leaves its bounds')
 
@@ -369,8 +370,8 @@ def test_a_vehicle_that_drifts_gets_a_shorter_recording_and_one_that_swings_a_hi
     assert [one.duration for one in tried] == [60.0, 45.0, 30.0, 20.0]
     assert [one.step for one in asked] == [0.02] * 4 + [0.05]
     last = tried[-1]
-    families, _, fleet = searching._drawn(last)
-    still = families[0].waves(np.full((1, 12), np.log(1e-9)))
+    phases, _, fleet = searching._drawn(last)
+    still = Family.of(last, phases[0]).waves(np.full((1, 12), np.log(1e-9)))
     used = last.bounds.used(motion_of(last, still, *fleet)).max(axis=(0, 1))
     assert last.bounds.speed == 0.5
     assert last.bounds.rate > 1.0
@@ -380,8 +381,8 @@ def test_a_vehicle_that_drifts_gets_a_shorter_recording_and_one_that_swings_a_hi
 
 
 def test_what_turns_over_by_itself_needs_no_higher_rate_but_a_controller() -> None:
-    request = request_of('herman2018_neutral')
-    assert searching.unexcited(replace(request, duration=20.0)) == (0.0, 0.0)
+    request = request_of('herman2018_neutral', duration=20.0)
+    assert searching.unexcited(request, searching._drawn(request)) == (0.0, 0.0)
 
 
 def test_a_multisine_as_a_scenario_has_it() -> None:
@@ -446,7 +447,7 @@ def test_a_run_that_diverges_is_recorded_as_not_finite() -> None:
 
 def test_an_axis_that_hardly_holds_the_vehicle_has_no_peak() -> None:
     request = request_of('herman2018', duration=2.0)  # which is lighter by 1079 N
-    family = Family.of(request, np.random.default_rng(0))
+    family = Family.of(request, PHASE)
     assert (family.most[2], 2 in family.driven) == (0.0, False)
 
 
@@ -484,7 +485,7 @@ def test_a_spread_of_a_tenth_is_ten_percent_of_inertia_and_damping(vehicle: str)
 
 def test_no_two_sines_share_a_frequency_and_peaks_are_as_asked() -> None:
     request = request_of()
-    family = Family.of(request, np.random.default_rng(0))
+    family = Family.of(request, PHASE)
     assert len(set(family.omega.ravel())) == 36
     x = np.r_[np.log([1.0, 0.5, 0.1, 1.0, 1.0, 0.2]), -1.0, 0.0, 1.0, 0.5, 0.0, 0.0][None]
     tau = family.waves(x).value(family.t)[0] - family.offset
@@ -499,13 +500,13 @@ def test_no_two_sines_share_a_frequency_and_peaks_are_as_asked() -> None:
     np.testing.assert_allclose(low, [np.log(0.02)] * 6 + [-1.5] * 6)
     np.testing.assert_allclose(high, [0.0] * 6 + [1.5] * 6)
     assert (omega.min(), omega.max()) == pytest.approx((0.3, 3.0))
-    longer = Family.of(request_of(duration=200.0), np.random.default_rng(0)).omega
+    longer = Family.of(request_of(duration=200.0), PHASE).omega
     assert longer.min() == pytest.approx(2.0 * np.pi * 3.0 / 200.0), 'three periods at least'
 
 
 def test_vehicles_of_a_closed_loop_move_as_their_errors_make_them() -> None:
     request = request_of(closed=True, duration=2.0, seed=7)
-    family = Family.of(request, np.random.default_rng(0))
+    family = Family.of(request, PHASE)
     waves = family.waves(np.zeros((1, 2 * len(family.driven))))
     wrong = {'kind': 'model_error', 'dM': (0.2 * request.vehicle.M).tolist()}
     prior, other = motion_of(request, waves, request.vehicle.model, [{}, wrong]).states[:, 0]
@@ -582,7 +583,7 @@ def test_a_vehicle_of_ones_own_is_named_where_it_lies(tmp_path: Path, monkeypatc
     (tmp_path / 'mine.yaml').write_text(text.replace(f'name: {VEHICLE}', f'name: {name}'))
     monkeypatch.chdir(tmp_path)
     request = request_of('mine.yaml', duration=2.0)
-    family = Family.of(request, np.random.default_rng(0))
+    family = Family.of(request, PHASE)
     wave = family.waves(np.zeros((1, 2 * len(family.driven)))).part(0)
     data = scenario_of(request, wave)
     assert data['vehicle'] == str(tmp_path / 'mine.yaml')
@@ -590,18 +591,11 @@ def test_a_vehicle_of_ones_own_is_named_where_it_lies(tmp_path: Path, monkeypatc
     assert data['sensors'] == {'velocity_noise': 0.005, 'attitude_noise': 0.003}
 
 
-def test_each_seed_draws_other_phases(monkeypatch) -> None:
-    drawn = []
-
-    def of(request: Request, rng: np.random.Generator) -> None:
-        drawn.append(rng.random())
-        raise FailedError('enough')
-
-    monkeypatch.setattr(searching.Family, 'of', of)
-    for seed in (0, 7, 7):
-        with pytest.raises(FailedError):
-            excite(request_of(seed=seed))
-    assert drawn[0] != drawn[1] == drawn[2]
+def test_each_seed_draws_other_phases() -> None:
+    one, other, again = (searching._drawn(request_of(seed=seed))[0] for seed in (0, 7, 7))
+    assert one.shape == (8, 6, 6)
+    assert (one != other).all()
+    np.testing.assert_array_equal(other, again)
 
 
 def test_vehicles_of_a_closed_loop_are_the_spread_away_from_the_prior() -> None:
@@ -624,7 +618,7 @@ def test_axes_that_may_not_be_driven_are_not(closed: bool) -> None:
     wrench = np.array([15.0, 15.0, 0.0, 0.0, 0.0, 2.0])
     request = request_of(bounds=replace(request_of().bounds, wrench=wrench), duration=2.0)
     request = replace(request, closed=closed)
-    family = Family.of(request, np.random.default_rng(0))
+    family = Family.of(request, PHASE)
     assert family.driven.tolist() == [0, 1, 5]
     assert not family.offset[2:5].any()
     waves = family.waves(np.zeros((1, 6)))

@@ -32,6 +32,9 @@ CONTROLLER = {False: 'open_loop', True: 'gvc'}  # by whether the loop is closed
 LEAST = 0.02  # of the largest wrench or set-point: the smallest that is tried
 STEEPEST = 1.5  # exponent of the frequency, by which amplitudes may fall or rise
 BEYOND = 1e3  # what stands for a motion that is not finite
+TILT = 0.8  # rad
+SPEED = 0.5  # m/s
+SHARE = 1 / 3  # of what the thrusters give on one axis alone, as all are driven at once
 WORDS = ('wrench', 'speed', 'angular rate', 'tilt', 'room')
 LONGEST = 80  # of the vehicle's name in that of the scenario
 
@@ -68,6 +71,34 @@ class Bounds:
             (2.0 * np.abs(x[..., :3]).max(axis=2) / self.room).max(axis=-1),
         )
         return np.stack(np.broadcast_arrays(*shares), axis=-1)
+
+
+def bounds_of(
+    vehicle: Vehicle, room: np.ndarray, wrench: np.ndarray | None, speed: float | None,
+    rate: float | None, least_speed: float = 0.0, least_rate: float = 0.0,
+) -> Bounds:  # fmt: skip
+    """Bounds, the usual ones where none are given.
+
+    Parameters
+    ----------
+    vehicle : the prior
+    room, wrench, speed, rate : as of `Bounds`; None: the usual one
+    least_speed, least_rate : m/s and rad/s that the usual ones must allow
+
+    """
+    speed = speed or max(SPEED, least_speed)
+    rate = rate or max(2.0 * speed, least_rate)
+    if wrench is None and vehicle.thrusters is not None:
+        driven = [dof not in vehicle.thrusters.unactuated() for dof in DOFS]
+        wrench = SHARE * vehicle.thrusters.alone().min(axis=0) * driven
+    elif wrench is None:
+        nu = np.repeat([speed, rate], 3)
+        tilted = np.array([0.0, 0.0, 0.0, 0.5 * TILT, 0.5 * TILT, 0.0])
+        still = vehicle.g(np.zeros(6))
+        turning = np.abs(vehicle.g(tilted) - still)
+        wrench = np.diag(vehicle.M) * nu + np.abs(np.diag(vehicle.D(nu)) * nu)
+        wrench = wrench + turning + np.abs(still)
+    return Bounds(wrench, speed, rate, TILT, room)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,10 +208,9 @@ class Family:
     t: np.ndarray
 
     @classmethod
-    def of(cls, request: Request, rng: np.random.Generator) -> 'Family':
-        """A family with random phases."""
+    def of(cls, request: Request, phase: np.ndarray) -> 'Family':
+        """A family of phases (6, 6) in rad."""
         bounds, t = request.bounds, np.arange(request.steps) * request.step
-        phase = rng.uniform(0.0, 2.0 * np.pi, (6, MOST))
         if request.closed:
             phase = np.where(phase < np.pi, 0.0, np.pi)  # no jump from rest at the start
             most = np.repeat([bounds.speed, bounds.rate], 3) * (bounds.wrench > 0.0)

@@ -7,8 +7,9 @@ the knowledge gained over the prior, whatever the units, in which no single coef
 can tell outweighs all others, as it would in a sum of variances (A-optimality).
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,7 @@ from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.plant.disturbance import Harmonics
 from auv_dynamics.vehicle.model import Model
 from auv_dynamics.vehicle.vehicle import Vehicle, make_model
+from auv_gvc_controller.laws.multisine import MOST
 
 PHASES, STARTS = 8, 8  # of random phases, and points of the search with the best of them
 ROUNDS = {False: ((1, 8),), True: ((1, 4),)}  # by whether the loop is closed
@@ -52,6 +54,7 @@ WIDER = ('--limit', '--speed', '--rate', '', '--depth or --tank')  # in the orde
 LIGHT, CORRELATED = 0.02, 0.5  # of the weight, of off-diagonal inertia: what a spread of 1 is
 Tick = Callable[[str, float], None]
 Fleet = tuple[Model, list[dict[str, Any]]]  # of the open loop, and errors of the closed one's plant
+Drawn = tuple[np.ndarray, Fleet, Fleet]  # (k, 6, 6) phases in rad, vehicles of search and check
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,13 +82,48 @@ class Excited:
     count: int
 
 
-def excite(request: Request, tick: Tick = lambda text, share: None) -> Excited:
+def planned(
+    request: Request, lengths: Sequence[float], bounds: Callable[[float, float], Bounds], tick: Tick
+) -> Excited:
+    """The excitation of the first length in which the motion keeps its bounds.
+
+    Parameters
+    ----------
+    request : what is asked for; length and bounds of the open loop are those below
+    lengths : s
+    bounds : of speed and rate that must be allowed, m/s and rad/s
+    tick : as of `excite`
+
+    Raises
+    ------
+    InputError, FailedError : as of `excite`, which is told of the last length
+
+    """
+    drawn = _drawn(request)
+
+    def attempt(duration: float) -> Excited:
+        steps = round(duration / request.step)
+        tried = replace(request, duration=round(steps * request.step, 9))
+        if not request.closed:
+            tried = replace(tried, bounds=bounds(*unexcited(tried, drawn)))
+        return excite(tried, tick, drawn)
+
+    for duration in lengths[:-1]:
+        with suppress(FailedError):
+            return attempt(duration)
+    return attempt(lengths[-1])
+
+
+def excite(
+    request: Request, tick: Tick = lambda text, share: None, drawn: Drawn | None = None
+) -> Excited:
     """Find an excitation.
 
     Parameters
     ----------
     request : what is asked for
     tick : told what is being done, and how much of it is done
+    drawn : phases and vehicles; None: as the request draws them
 
     Raises
     ------
@@ -93,7 +131,8 @@ def excite(request: Request, tick: Tick = lambda text, share: None) -> Excited:
     FailedError : the motion leaves its bounds, whatever is driven
 
     """
-    families, fleet, every = _drawn(request)
+    phases, few, many = drawn or _drawn(request)
+    families = [Family.of(request, phase) for phase in phases]
     if not len(families[0].driven):
         found = ', '.join(f'{value:g}' for value in request.hold)
         expected = 'more than what holds the vehicle still, in some degree of freedom'
@@ -103,7 +142,7 @@ def excite(request: Request, tick: Tick = lambda text, share: None) -> Excited:
         raise InputError('--free', '', 'a coefficient that is free', 'none')
 
     def evaluated(family: Family, x: np.ndarray) -> np.ndarray:
-        motion = motion_of(request, family.waves(x), *fleet)
+        motion = motion_of(request, family.waves(x), *few)
         used = np.maximum(request.bounds.used(motion).max(axis=0), 1e-3)
         return np.concatenate([-_gained(request, u, motion)[None], np.log(RESERVE / used.T)])
 
@@ -111,12 +150,12 @@ def excite(request: Request, tick: Tick = lambda text, share: None) -> Excited:
     middle = np.zeros((1, len(low)))
     least = middle.copy()
     least[:, : len(families[0].driven)] = np.log(LEAST)
-    motion = motion_of(request, families[0].waves(least), *every)
+    motion = motion_of(request, families[0].waves(least), *many)
     _check(request, request.bounds.used(motion)[:, 0])  # what leaves them undriven always does
     gained = []
     for k, family in enumerate(families):
         tick('phases', k / PHASES)
-        gained.append(evaluated(family, within(request, family, middle, fleet, RESERVE))[0, 0])
+        gained.append(evaluated(family, within(request, family, middle, few, RESERVE))[0, 0])
     family, rounds, count = families[int(np.argmin(gained))], ROUNDS[request.closed], 0
     total = STARTS + (2 * len(low) + 1) * sum(n * gradients for n, gradients in rounds)
 
@@ -128,10 +167,10 @@ def excite(request: Request, tick: Tick = lambda text, share: None) -> Excited:
 
     search = Search(counted, low, high, ['ineq'] * len(WORDS), TOLERANCE, APART)
     starts = np.vstack([middle, sobol_points(low, high, STARTS, request.seed)[1:]])
-    best = search.run(within(request, family, starts, fleet, RESERVE), rounds)[None]
+    best = search.run(within(request, family, starts, few, RESERVE), rounds)[None]
     tick('checking', 0.0)
-    wave = family.waves(within(request, family, best, every, 1.0))
-    motion = motion_of(request, wave, *every)
+    wave = family.waves(within(request, family, best, many, 1.0))
+    motion = motion_of(request, wave, *many)
     used = request.bounds.used(motion)[:, 0]
     _check(request, used)
     predicted = prediction(request, motion.commands[0, 0], motion.states[0, 0])
@@ -146,15 +185,15 @@ def usual_step(vehicle: Vehicle, bounds: Bounds) -> float:
     return next((step for step in STEPS if step * rate < SMOOTH), STEPS[-1])
 
 
-def unexcited(request: Request) -> tuple[float, float]:
+def unexcited(request: Request, drawn: Drawn) -> tuple[float, float]:
     """Speed and rate, m/s and rad/s, that vehicles around the prior need without excitation.
 
     With some to spare; zero where an open loop of them leaves tilt or room.
     """
-    families, _, fleet = _drawn(request)
-    rest = Harmonics(families[0].offset[None], (np.zeros((1, 0, 3)),) * 6)
-    bounds = request.bounds
-    used = bounds.used(motion_of(request, rest, *fleet)).max(axis=(0, 1))
+    phases, _, many = drawn
+    offset, bounds = Family.of(request, phases[0]).offset, request.bounds
+    rest = Harmonics(offset[None], (np.zeros((1, 0, 3)),) * 6)
+    used = bounds.used(motion_of(request, rest, *many)).max(axis=(0, 1))
     if used[3:].max() > 1.0:
         return 0.0, 0.0
     return float(FASTER * used[1] * bounds.speed), float(FASTER * used[2] * bounds.rate)
@@ -198,12 +237,12 @@ def _unknowns(request: Request, speeds: np.ndarray, wrenches: np.ndarray) -> Unk
     )  # fmt: skip
 
 
-def _drawn(request: Request) -> tuple[list[Family], Fleet, Fleet]:
-    """Families of random phases, vehicles of the search, and those of the check."""
+def _drawn(request: Request) -> Drawn:
+    """What chance decides, whatever length and bounds are."""
     rng = np.random.default_rng(request.seed)
-    families = [Family.of(request, rng) for _ in range(PHASES)]
+    phases = rng.uniform(0.0, 2.0 * np.pi, (PHASES, 6, MOST))
     few, many = (_fleet(request, rng, count[request.closed]) for count in (DRAWS, CHECKED))
-    return families, few, many
+    return phases, few, many
 
 
 def _fleet(request: Request, rng: np.random.Generator, count: int) -> Fleet:

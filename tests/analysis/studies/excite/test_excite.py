@@ -428,6 +428,12 @@ def test_segments_follow_one_another_and_carry_what_was_commanded_before() -> No
         assert one.nu[:, 0].tolist() == one.q[:, 0].tolist() == list(range(k + 1, k + 5))
         assert one.start[0] == k
         assert [part.shape[-1] for part in (one.nu, one.q, one.start)] == [6, 4, 10]
+    fewer = segments(request, commands, states[::2], 2.0)
+    for one, other in zip(fewer, found, strict=True):
+        assert one.at.tolist() == [2, 4]
+        np.testing.assert_array_equal(one.nu, other.nu[1::2])
+        for part in ('before', 'command', 'start', 'begin'):
+            np.testing.assert_array_equal(getattr(one, part), getattr(other, part))
 
 
 def test_a_run_that_diverges_is_recorded_as_not_finite() -> None:
@@ -516,6 +522,19 @@ def test_vehicles_of_a_closed_loop_move_as_their_errors_make_them() -> None:
     run = simulate(scenario_in_memory(request, data | {'disturbance': [wrong]}), 'gvc', 'zoh')
     np.testing.assert_allclose(other[:, 7:], run.nu, atol=1e-12)
     assert np.abs(other - prior).max() > 1e-3
+
+
+@pytest.mark.parametrize('closed', [False, True])
+def test_a_fine_step_shows_the_search_every_twentieth_of_a_second(closed: bool) -> None:
+    request = request_of(closed=closed, duration=1.0, step=0.01)
+    waves = Family.of(request, PHASE).waves(np.zeros((1, 12)))
+    every, fewer = (
+        motion_of(request, waves, request.vehicle.model, [{}], every) for every in (1, 5)
+    )
+    np.testing.assert_array_equal(fewer.commands, every.commands)
+    np.testing.assert_array_equal(fewer.states, every.states[:, :, ::5])
+    _, few, many = searching._drawn(request)
+    assert (few[-1], many[-1], request_of().every) == (5, 1, 1)
 
 
 def test_a_vehicle_that_sinks_must_close_its_loop(monkeypatch) -> None:

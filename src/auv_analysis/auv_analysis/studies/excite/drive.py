@@ -31,7 +31,8 @@ LOOP = {'law': 'gvc', 'k_D': 3.0, 'k_I': 0.5, 'Lambda': 0.5, 'Gamma': 1.0}
 CONTROLLER = {False: 'open_loop', True: 'gvc'}  # by whether the loop is closed
 LEAST = 0.02  # of the largest wrench or set-point: the smallest that is tried
 STEEPEST = 1.5  # exponent of the frequency, by which amplitudes may fall or rise
-BEYOND = 1e3  # what stands for a motion that is not finite
+BEYOND = 1e6  # share of a bound that stands for a motion that is not finite
+LOOK = 0.05  # s, from a state that shows how far a motion goes to the next, while searching
 TILT = 0.8  # rad
 SPEED = 0.5  # m/s
 SHARE = 1 / 3  # of what the thrusters give on one axis alone, as all are driven at once
@@ -59,18 +60,21 @@ class Bounds:
 
     def used(self, motion: 'Motion') -> np.ndarray:
         """(V, B, 5) share of each bound that motions use, in the order of `WORDS`."""
-        x = np.nan_to_num(motion.states, nan=BEYOND, posinf=BEYOND, neginf=-BEYOND)
-        x = np.clip(x, -BEYOND, BEYOND)
-        upright = np.clip(1.0 - 2.0 * (x[..., 4] ** 2 + x[..., 5] ** 2), -1.0, 1.0)
-        force = np.abs(motion.commands) / np.where(self.wrench > 0.0, self.wrench, np.inf)
+        x, limit = motion.states, np.where(self.wrench > 0.0, self.wrench, np.inf)
+        with np.errstate(all='ignore'):  # states may be what is left of a divergence
+            speed, rate, tilted = (
+                np.einsum('...i,...i', part, part).max(axis=2)
+                for part in (x[..., 7:10], x[..., 10:], x[..., 4:6])
+            )
         shares = (
-            force.max(axis=(2, 3)),
-            np.linalg.norm(x[..., 7:10], axis=-1).max(axis=2) / self.speed,
-            np.linalg.norm(x[..., 10:], axis=-1).max(axis=2) / self.rate,
-            np.arccos(upright).max(axis=2) / self.tilt,
+            (np.abs(motion.commands).max(axis=2) / limit).max(axis=-1),
+            np.sqrt(speed) / self.speed,
+            np.sqrt(rate) / self.rate,
+            np.arccos(np.clip(1.0 - 2.0 * tilted, -1.0, 1.0)) / self.tilt,
             (2.0 * np.abs(x[..., :3]).max(axis=2) / self.room).max(axis=-1),
         )
-        return np.stack(np.broadcast_arrays(*shares), axis=-1)
+        used = np.stack(np.broadcast_arrays(*shares), axis=-1)
+        return np.nan_to_num(used, nan=BEYOND, posinf=BEYOND)
 
 
 def bounds_of(
@@ -164,6 +168,11 @@ class Request:
         return round(self.duration / self.step)
 
     @property
+    def every(self) -> int:
+        """Steps from one state that the search looks at to the next."""
+        return max(round(LOOK / self.step), 1)
+
+    @property
     def follow(self) -> np.ndarray:
         """(1, 6) share of the way that the lag covers in a step."""
         return np.full((1, 6), -np.expm1(-self.step / max(self.lag, 1e-9)))
@@ -176,9 +185,9 @@ class Request:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Commands (V, B, n, 6), V = 1 of all vehicles the same, and states (V, B, n + 1, 13).
+    """Commands (V, B, n, 6), V = 1 of all vehicles the same, and states (V, B, n // every + 1, 13).
 
-    A state has position, quaternion and velocity.
+    A state has position, quaternion and velocity, the first one before the first step.
     """
 
     commands: np.ndarray
@@ -293,8 +302,9 @@ def scenario_of(request: Request, wave: Harmonics) -> dict[str, Any]:
 
 
 def motion_of(
-    request: Request, waves: Harmonics, models: Model, errors: Sequence[dict[str, Any]]
-) -> Motion:
+    request: Request, waves: Harmonics, models: Model, errors: Sequence[dict[str, Any]],
+    every: int = 1,
+) -> Motion:  # fmt: skip
     """Motions (V, B) of vehicles under multisines.
 
     Parameters
@@ -303,21 +313,24 @@ def motion_of(
     waves : (B,) multisines
     models : (V,) vehicles of the open loop, the prior first
     errors : of the closed loop, disturbances of kind model_error; {}: none
+    every : steps from one state to the next
 
     """
     if request.closed:
-        return _closed(request, waves, errors)
+        return _closed(request, waves, errors, every)
     commands = waves.value(np.arange(request.steps) * request.step)
     start = initial_state(np.zeros((1, len(commands), 6)), np.zeros((1, len(commands), 6)))
     states = open_loop(
         models, commands, start, request.step, follow=request.follow,
-        applied=np.zeros((1, len(commands), 6)),
+        applied=np.zeros((1, len(commands), 6)), every=every,
     )  # fmt: skip
     first = np.broadcast_to(start[:, :, None], (*states.shape[:2], 1, 13))
     return Motion(commands[None], np.concatenate([first, states], axis=2))
 
 
-def _closed(request: Request, waves: Harmonics, errors: Sequence[dict[str, Any]]) -> Motion:
+def _closed(
+    request: Request, waves: Harmonics, errors: Sequence[dict[str, Any]], every: int
+) -> Motion:
     """Motions of closed loops, without noise: that of the sensors is no part of the plan."""
     commands, states = [], []
     driven = request.bounds.wrench > 0.0  # what a law asks for of other axes never acts
@@ -331,7 +344,7 @@ def _closed(request: Request, waves: Harmonics, errors: Sequence[dict[str, Any]]
             scenario = replace(checked, data=resolved(data))
             command, state = recorded(scenario, CONTROLLER[True])
             commands.append(np.where(driven, command, 0.0))
-            states.append(state)
+            states.append(state[::every])
     shape = len(errors), len(waves.offset)
     return Motion(*(np.reshape(part, (*shape, *part[0].shape)) for part in (commands, states)))
 

@@ -53,7 +53,8 @@ FASTER = 1.25  # times the speeds without excitation: what must be allowed
 WIDER = ('--limit', '--speed', '--rate', '', '--depth or --tank')  # in the order of `WORDS`
 LIGHT, CORRELATED = 0.02, 0.5  # of the weight, of off-diagonal inertia: what a spread of 1 is
 Tick = Callable[[str, float], None]
-Fleet = tuple[Model, list[dict[str, Any]]]  # of the open loop, and errors of the closed one's plant
+Errors = list[dict[str, Any]]
+Fleet = tuple[Model, Errors, int]  # as of `motion_of`
 Drawn = tuple[np.ndarray, Fleet, Fleet]  # (k, 6, 6) phases in rad, vehicles of search and check
 
 
@@ -242,10 +243,10 @@ def _drawn(request: Request) -> Drawn:
     rng = np.random.default_rng(request.seed)
     phases = rng.uniform(0.0, 2.0 * np.pi, (PHASES, 6, MOST))
     few, many = (_fleet(request, rng, count[request.closed]) for count in (DRAWS, CHECKED))
-    return phases, few, many
+    return phases, (*few, request.every), (*many, 1)
 
 
-def _fleet(request: Request, rng: np.random.Generator, count: int) -> Fleet:
+def _fleet(request: Request, rng: np.random.Generator, count: int) -> tuple[Model, Errors]:
     """The prior and vehicles around it: of the open loop, and of the closed one."""
     vehicle, spread = request.vehicle, request.spread
     one = np.ones(6)
@@ -264,7 +265,7 @@ def _fleet(request: Request, rng: np.random.Generator, count: int) -> Fleet:
         vehicle.D_quadratic * np.exp(spread * off[1]), found.hydrostatics + light,
         None if vehicle.lift is None else np.broadcast_to(vehicle.lift, found.M.shape),
     )  # fmt: skip
-    errors: list[dict[str, Any]] = [{}]
+    errors: Errors = [{}]
     for k in range(count):
         a, b = spread * (np.array([1.0, -1.0]) if k < 2 else rng.uniform(-1.0, 1.0, 2))
         a, b = (-a, -b) if k == 1 else (a, b)
@@ -301,20 +302,22 @@ def segments(
     Parameters
     ----------
     request : step
-    commands, states : (n, 6) and (n + 1, 13)
+    commands, states : (n, 6) and (n // every + 1, 13)
     length : s
 
     """
-    before = int(np.ceil(HISTORY / request.step))
-    n = max(round(length / request.step), 2)
-    return [
-        Segment(
-            commands[first - before : first], commands[first : first + n], np.arange(1.0, n + 1.0),
-            states[first + 1 : first + n + 1, 7:], states[first + 1 : first + n + 1, 3:7],
-            states[first, 3:], first * request.step,
-        )
-        for first in range(before, len(commands) - n + 1, n)
-    ]  # fmt: skip
+    every = len(commands) // (len(states) - 1)
+    before = every * int(np.ceil(HISTORY / request.step / every))
+    n = every * max(round(length / request.step / every), 2)
+    found = []
+    for first in range(before, len(commands) - n + 1, n):
+        rows = states[first // every : (first + n) // every + 1, 3:]
+        found.append(Segment(
+            commands[first - before : first], commands[first : first + n],
+            np.arange(every, n + 1.0, every), rows[1:, 4:], rows[1:, :4], rows[0],
+            first * request.step,
+        ))  # fmt: skip
+    return found
 
 
 def prediction(request: Request, commands: np.ndarray, states: np.ndarray) -> Identified:

@@ -17,7 +17,7 @@ from auv_analysis.output.folder import listed_in, results_folder
 from auv_analysis.report.results import Results
 from auv_analysis.studies.excite import excite as searching
 from auv_analysis.studies.excite.drive import (
-    LOOP,
+    BEYOND,
     Bounds,
     Family,
     Motion,
@@ -297,7 +297,7 @@ def test_case_1_is_as_long_and_one_that_diverges_tells_nothing(monkeypatch) -> N
     ((scenario, controller),) = simulated
     data = scenario.data
     assert (data['duration'], data['step'], data['actuators']['lag']) == (40.0, 0.1, 0.3)
-    assert (controller, data['controllers']) == ('gvc', {'gvc': LOOP})
+    assert (controller, data['controllers']) == ('gvc', {'gvc': request_of().loop})
 
 
 def test_a_motion_that_is_not_finite_gains_nothing(excited) -> None:
@@ -332,20 +332,29 @@ def test_shares_of_the_bounds_by_hand() -> None:
 def test_what_leaves_the_bounds_is_said(closed: bool) -> None:
     request = request_of(closed=closed)
     _check(request, np.array([[1.0, 0.5, 0.5, 0.5, 1.0], [0.2, 1.0, 0.5, 1.0, 0.1]]))
-    loop, other = ('closed', '') if closed else ('open', ', --closed-loop')
-    near = 'a vehicle near the prior'
-    for used, said in (
+    loop = 'the closed loop' if closed else 'the open loop'
+    near, any_ = 'a vehicle near the prior takes', 'the vehicle, or one near it, takes'
+    both = '1.1 times the speed and 1.3 times the angular rate that is allowed'
+    for used, said, ways in (
         ([[0.5, 0.5, 1.2, 0.5, 0.9], [0.5, 1.1, 1.3, 0.5, 0.5]],
-         'the vehicle takes 1.3 times the angular rate that is allowed: a larger --rate'),
-        ([[0.5, 0.5, 1.0, 0.5, 1.1], [0.5, 1.1, 1.25, 0.5, 0.5]],
-         f'{near} takes 1.25 times the angular rate that is allowed: a larger --rate, a smaller '
-         '--spread'),
+         f'{any_} {both}', ['a larger --speed and --rate']),
+        ([[0.5, 0.5, 1.0, 0.5, 1.0], [0.5, 1.1, 1.3, 0.5, 0.5]],
+         f'{near} {both}', ['a larger --speed and --rate', 'a smaller --spread']),
         ([[0.5, 0.5, 0.5, 0.5, 0.5], [0.5, 0.5, 0.5, 1.5, 1.0]],
-         f'{near} takes 1.5 times the tilt that is allowed: a smaller --spread'),
+         f'{near} 1.5 times the tilt that is allowed', ['a smaller --spread']),
+        ([[0.5, 0.5, 0.5, 3.93, 12.9]],
+         f'{any_} 3.93 times the tilt and 12.9 times the room that is allowed', []),
+        ([[2.5, 1.2, 0.5, 3.9, 0.5]],
+         f'{any_} 2.5 times the wrench that is allowed', ['a larger --limit']),
     ):  # fmt: skip
         with pytest.raises(FailedError) as left:
             _check(request, np.array(used))
-        assert str(left.value) == (f'{VEHICLE}: the {loop} loop leaves its bounds: {said}{other}')
+        way = ', '.join(ways if closed else [*ways, '--closed-loop']) or 'no option helps'
+        assert str(left.value) == f'{VEHICLE}: {loop} leaves its bounds: {said}: {way}'
+    with pytest.raises(FailedError) as left:
+        _check(request, np.array([[0.5] * 5, [BEYOND] * 5]))
+    other = ' or --lag' if closed else ''
+    assert str(left.value) == f'{VEHICLE}: {loop} diverges: a smaller --step{other}'
 
 
 def test_a_vehicle_that_drifts_gets_a_shorter_recording_and_one_that_swings_a_higher_rate(
@@ -535,6 +544,25 @@ def test_a_fine_step_shows_the_search_every_twentieth_of_a_second(closed: bool) 
     np.testing.assert_array_equal(fewer.states, every.states[:, :, ::5])
     _, few, many = searching._drawn(request)
     assert (few[-1], many[-1], request_of().every) == (5, 1, 1)
+
+
+def test_the_closed_loop_of_a_small_vehicle_keeps_its_wrench(tmp_path: Path) -> None:
+    data = {
+        'name': 'tiny', 'source': 'made up',
+        'rigid_body': {'mass': 0.3, 'center_of_gravity': [0.0, 0.0, 0.004],
+                       'inertia': np.diag([4e-4, 7e-4, 8e-4]).tolist(), 'inertia_reference': 'cg'},
+        'hydrostatics': {'volume': 0.0003, 'center_of_buoyancy': [0.0, 0.0, 0.0]},
+        'added_mass': [0.15, 0.3, 0.4, 1e-4, 2e-4, 2e-4],
+        'damping': {'linear': [0.1, 0.2, 0.25, 2e-4, 4e-4, 4e-4],
+                    'quadratic': [0.8, 1.5, 2.0, 3e-4, 6e-4, 6e-4]},
+        'environment': {'water_density': 1000.0, 'gravity': 9.81},
+    }  # fmt: skip
+    path = tmp_path / 'tiny.yaml'
+    path.write_text(yaml.safe_dump(data))
+    bounds = bounds_of(load_vehicle(path), np.array(TANK), None, None, None)
+    request = request_of(str(path), bounds=bounds, closed=True, duration=20.0)
+    waves = Family.of(request, PHASE).waves(np.repeat([[np.log(0.02), 0.0]], 6, axis=1))
+    assert bounds.used(motion_of(request, waves, request.vehicle.model, [{}])).max() < 0.3
 
 
 def test_a_vehicle_that_sinks_must_close_its_loop(monkeypatch) -> None:

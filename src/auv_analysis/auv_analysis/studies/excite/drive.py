@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.runs.run import Run
-from auv_analysis.scenario.scaling import plain_name
+from auv_analysis.scenario.scaling import plain_name, scaled_gains
 from auv_analysis.scenario.scenario import Scenario, resolved, scenario_from
 from auv_analysis.simulation.open_loop import open_loop
 from auv_analysis.simulation.simulate import DivergedError, simulate
@@ -27,7 +27,7 @@ from auv_gvc_controller.laws import OPEN_LOOP
 from auv_gvc_controller.laws.multisine import MOST
 
 PERIODS, FASTEST = 3.0, 3.0  # of the slowest sine in the recording; rad/s of the fastest one
-LOOP = {'law': 'gvc', 'k_D': 3.0, 'k_I': 0.5, 'Lambda': 0.5, 'Gamma': 1.0}
+LOOP = {'law': 'gvc', 'k_D': 3.0, 'Lambda': 0.5, 'Gamma': 1.0}
 CONTROLLER = {False: 'open_loop', True: 'gvc'}  # by whether the loop is closed
 LEAST = 0.02  # of the largest wrench or set-point: the smallest that is tried
 STEEPEST = 1.5  # exponent of the frequency, by which amplitudes may fall or rise
@@ -151,6 +151,11 @@ class Request:
     def vehicle(self) -> Vehicle:
         """The prior."""
         return vehicle_from_dict(self.vehicle_data, self.path)
+
+    @cached_property
+    def loop(self) -> dict[str, Any]:
+        """Law and gains of the closed loop, as fast for any vehicle."""
+        return LOOP | {'k_I': scaled_gains(self.given)['gvc']['k_I']}
 
     @property
     def clipped(self) -> bool:
@@ -291,7 +296,7 @@ def scenario_of(request: Request, wave: Harmonics) -> dict[str, Any]:
         'seed': request.seed,
     }
     if request.closed:
-        data |= {'controllers': {CONTROLLER[True]: dict(LOOP)}, 'setpoint': spec_of(wave)}
+        data |= {'controllers': {CONTROLLER[True]: request.loop}, 'setpoint': spec_of(wave)}
     else:
         data |= {'controllers': {CONTROLLER[False]: {'law': OPEN_LOOP}}, 'setpoint': {}}
         data['excitation'] = spec_of(wave)

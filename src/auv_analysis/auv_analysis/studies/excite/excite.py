@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.output.text import join
 from auv_analysis.scenario.scaling import scaled_case1
 from auv_analysis.studies.excite.drive import (
+    BEYOND,
     LEAST,
-    LOOP,
     WORDS,
     Bounds,
     Family,
@@ -350,8 +351,8 @@ def of_case1(request: Request) -> Identified | None:
     data = scaled_case1(request.given)
     keys = ('format', 'name', 'vehicle', 'setpoint')
     data = {key: data[key] for key in keys if key in data}
-    data |= {'controllers': {'gvc': dict(LOOP)}, 'duration': request.duration, 'step': request.step}
-    data['actuators'] = {'lag': request.lag}
+    data |= {'controllers': {'gvc': request.loop}, 'actuators': {'lag': request.lag}}
+    data |= {'duration': request.duration, 'step': request.step}
     commands, states = recorded(scenario_in_memory(request, data), 'gvc')
     if not np.isfinite(states).all():
         return None
@@ -363,13 +364,14 @@ def _check(request: Request, used: np.ndarray) -> None:
     worst = used.max(axis=0)
     if np.all(worst <= 1.0):
         return
-    k = int(np.argmax(worst))
-    near = bool(used[0, k] <= 1.0)
-    whose, loop = 'a vehicle near the prior' if near else 'the vehicle', 'closed'
-    ways = [f'a larger {WIDER[k]}'] * bool(WIDER[k]) + ['a smaller --spread'] * near
-    if not request.closed:
-        loop, ways = 'open', [*ways, '--closed-loop']
-    raise FailedError(
-        f'{request.vehicle.name}: the {loop} loop leaves its bounds: {whose} takes '
-        f'{worst[k]:.3g} times the {WORDS[k]} that is allowed: {", ".join(ways)}'
-    )
+    said = f'{request.vehicle.name}: the {"closed" if request.closed else "open"} loop'
+    if worst.max() >= BEYOND:
+        raise FailedError(f'{said} diverges: a smaller --step{" or --lag" * request.closed}')
+    over = [0] if worst[0] > 1.0 else np.flatnonzero(worst > 1.0).tolist()  # it limits the rest
+    wider, near = [WIDER[k] for k in over], bool(used[0].max() <= 1.0)
+    ways = [f'a larger {join(wider)}'] * all(wider) + ['a smaller --spread'] * near
+    ways += ['--closed-loop'] * (not request.closed)
+    whose = 'a vehicle near the prior' if near else 'the vehicle, or one near it,'
+    shares = join([f'{worst[k]:.3g} times the {WORDS[k]}' for k in over])
+    raise FailedError(f'{said} leaves its bounds: {whose} takes {shares} that is allowed: '
+                      + (', '.join(ways) or 'no option helps'))  # fmt: skip

@@ -1,6 +1,5 @@
 """Bags of a driver: stamps of its own, set-points on another grid, topics under other names."""
 
-import contextlib
 import json
 import tempfile
 from itertools import product
@@ -26,7 +25,6 @@ from auv_analysis.nodes.recorder_node import StepLedger
 from auv_analysis.runs.run import Run
 from auv_analysis.studies.compare.sources import open_source, sources_of
 from auv_dynamics.files.errors import InputError
-from auv_gvc_controller.control.setpoint_buffer import NONE, SetpointBuffer
 
 MS = 1_000_000
 VEHICLE = load_scenario('case1').attachments['vehicle.yaml']
@@ -292,19 +290,6 @@ def test_a_set_point_takes_the_place_of_those_that_lie_ahead_of_it(stamps, kept)
     assert_array_equal(found['cmd_vel'][0], ns[kept])
     assert_array_equal(found['cmd_vel'][1], rows[kept])
     assert found['odom'][0] is ns
-
-
-@given(stamps=st.lists(st.integers(0, 9), max_size=30))
-@quick
-def test_of_columns_those_set_points_are_kept_that_a_controller_keeps(stamps) -> None:
-    buffer = SetpointBuffer(exact=False, acceleration=NONE, steepest=(1.0,) * 6)
-    for k, ns in enumerate(stamps):
-        with contextlib.suppress(ValueError):
-            buffer.setpoint(ns, (float(k),) * 6)
-    ns, rows = obeyed({'cmd_vel': (np.array(stamps, np.int64), np.arange(len(stamps)))})['cmd_vel']
-    found = {now: buffer.find(now) for now in range(10)}
-    kept = {now: rows[ns <= now][-1:].tolist() for now in found}
-    assert {now: [one.nu_d[0]] if one else [] for now, one in found.items()} == kept
 
 
 @pytest.mark.parametrize('params', ['lockstep: true', 'lockstep: false'])

@@ -1,6 +1,12 @@
 """Which set-point belongs to an odometry: the same stamp, or the newest one before it."""
 
+import contextlib
+
+import numpy as np
 import pytest
+from helpers.strategies import examples
+from hypothesis import given
+from hypothesis import strategies as st
 
 from auv_gvc_controller.control.odometry_guard import Limits
 from auv_gvc_controller.control.setpoint_buffer import (
@@ -11,6 +17,7 @@ from auv_gvc_controller.control.setpoint_buffer import (
     SAME,
     Reference,
     SetpointBuffer,
+    followed,
 )
 
 MS = 1_000_000
@@ -191,3 +198,17 @@ def test_a_set_point_that_came_out_of_order_is_not_gone_back_to():
     for k in (30, 35, 49):
         assert pairing.find(k * MS) == Reference(20 * MS, six(20), six(-20))
     assert pairing.find(50 * MS).ns == 50 * MS
+
+
+@given(stamps=st.lists(st.integers(0, 9), max_size=30))
+@examples(15)
+def test_of_columns_those_are_followed_that_are_kept_one_by_one(stamps):
+    pairing = SetpointBuffer(exact=False, acceleration=NONE, steepest=(1.0,) * 6)
+    for k, ns in enumerate(stamps):
+        with contextlib.suppress(ValueError):
+            pairing.setpoint(ns, six(float(k)))
+    kept = followed(np.array(stamps, np.int64)).tolist()
+    for now in range(10):
+        found = pairing.find(now)
+        earlier = [k for k in kept if stamps[k] <= now]
+        assert (found and found.nu_d) == (six(float(earlier[-1])) if earlier else None)

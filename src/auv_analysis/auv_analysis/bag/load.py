@@ -30,14 +30,13 @@ from auv_dynamics.plant.plant import unwrapped_eta
 from auv_dynamics.ros import interface
 from auv_dynamics.vehicle.frames import NED_FSD, named_axes
 from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_gvc_controller.control.setpoint_buffer import followed
 
 WHOLE = 1 << 16  # steps up to which a recording is kept in memory
 REQUIRED = (interface.ODOM, interface.WRENCH)
 Steps = tuple[np.ndarray, dict[str, np.ndarray]]  # stamps (n,) in ns, role -> values
 SETPOINTS = (interface.CMD_VEL, interface.CMD_ACCEL)
 LATEST = 'latest'
-AHEAD = 60 * interface.NANOSECONDS  # ns, further than that no set-point lies ahead
-NEVER = np.iinfo(np.int64).max
 UNPAIRED = 0.25  # share of odometry without a set-point of its stamp, up to which they were lost
 
 
@@ -442,17 +441,13 @@ def _picked(rows: np.ndarray, index: np.ndarray, whole: float) -> np.ndarray:
 def obeyed(series: Mapping[str, Series], whole: float = math.inf) -> dict[str, Series]:
     """The series, role -> stamps in the order of the bag and rows, as a controller follows them.
 
-    In real time a set-point takes the place of those that lie ahead of its stamp, and one that
-    repeats a stamp is refused: of messages one by one, `SetpointBuffer` says the same.
+    In real time a set-point takes the place of those that lie ahead of its stamp, see `followed`.
     """
     found = dict(series)
     for role in SETPOINTS:
         if role in series and not _is_rising(series[role][0]):
             ns, rows = series[role]
-            index = np.flatnonzero(np.diff(ns, prepend=-1))
-            late = np.maximum.accumulate(ns) - ns > AHEAD  # refused: of no time that lies ahead
-            least = np.minimum.accumulate(np.where(late, NEVER, ns)[index][::-1])[::-1]
-            kept = index[ns[index] < np.append(least[1:], NEVER)]
+            kept = followed(ns)
             found[role] = ns[kept], _picked(rows, kept, whole)
     return found
 

@@ -4,6 +4,8 @@ import math
 from collections import OrderedDict
 from typing import NamedTuple
 
+import numpy as np
+
 from auv_gvc_controller.control.odometry_guard import ZERO, Limits
 
 Six = tuple[float, ...]
@@ -73,6 +75,8 @@ UNLIMITED = Limits()
 SAME, FILTER, NONE, DIFFERENCE = 'topic', 'filter', 'none', 'difference'
 LEAST = 5_000_000  # ns that two set-points are taken to be apart at least
 CAPACITY = 4096  # set-points kept; more than any horizon that is accepted
+AHEAD = 60_000_000_000  # ns, further than that no set-point lies ahead
+NEVER = np.iinfo(np.int64).max
 
 
 class Reference(NamedTuple):
@@ -221,3 +225,15 @@ class SetpointBuffer:
         if self._steepest is None:
             return slope
         return tuple(clamped(*entry) for entry in zip(slope, self._steepest, strict=True))
+
+
+def followed(ns: np.ndarray) -> np.ndarray:
+    """Numbers of the set-points that a buffer in real time keeps, of stamps (n,) as they came, ns.
+
+    As `SetpointBuffer` says one by one: a repeated stamp is refused, and one that is stamped before
+    those that wait takes the place of what lies ahead.
+    """
+    index = np.flatnonzero(np.diff(ns, prepend=-1))
+    late = np.maximum.accumulate(ns) - ns > AHEAD  # refused: of no time that lies ahead
+    least = np.minimum.accumulate(np.where(late, NEVER, ns)[index][::-1])[::-1]
+    return index[ns[index] < np.append(least[1:], NEVER)]

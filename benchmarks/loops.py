@@ -83,7 +83,7 @@ def prepared(scenario: Scenario, changes: dict[str, np.ndarray]) -> Batch:
 def single(scenario: Scenario) -> Callable[[], Figures]:
     """One closed loop, prepared in the same way: a function that runs it and gives its figures."""
     loop = loop_of(scenario, CONTROLLER)
-    vehicle, known = with_batch_axis(loop), list(blocks(scenario))
+    vehicle, known = with_batch_axis(loop), list(blocks(scenario, 'continuous'))
     motion, work = (with_batch_axis(part) for part in at_start(scenario, loop))
     start, tableau = motion.x.copy(), TABLEAUS[scenario.data['integrator']]
     t = np.arange(scenario.steps + 1) * scenario.step

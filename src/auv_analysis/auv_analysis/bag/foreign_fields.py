@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING
+from functools import partial
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -243,7 +244,7 @@ class MessageReader:
         getters: list[Callable[[Any], Any]] = []
         for key, told in zip(keys, self._paths, strict=True):
             if not isinstance(told, str):
-                getters.append(lambda _, number=float(told): number)
+                getters.append(partial(lambda number, _: number, float(told)))
                 continue
             path = told.removeprefix('-')
             get = getter(message, path)

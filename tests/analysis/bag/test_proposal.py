@@ -196,10 +196,11 @@ def test_what_is_called_wrench_is_likeliest_and_a_disturbance_is_no_wrench(tmp_p
     bag = Bag(tmp_path / 'ours.mcap')
     names = ['/wrench_applied', '/disturbance', '/disturbance_estimate', '/analysis/delta_pi']
     for k in range(9):
-        for topic in [*names, '/tau', *['/auv/wrench'] * (k > 3)]:
+        for topic in [*names, '/disturbance/tau', *['/auv/wrench'] * (k > 3)]:
             bag.add(topic, WRENCH, k * SECOND, serialized(stamped('Wrench', k * SECOND, range(6))))
     path = bag.close()
-    assert candidates(survey(path))['wrench'] == ['/auv/wrench', '/wrench_applied', '/tau']
+    found = candidates(survey(path))['wrench']
+    assert found == ['/auv/wrench', '/wrench_applied', '/disturbance/tau']
     assert proposed(path)[1]['wrench'] == {'topic': '/auv/wrench'}
 
 

@@ -126,7 +126,8 @@ def unexplained(
         twist = replace(twist, rows=np.where(moved, twist.rows, 0.0))
     if len(unknown) == len(EULER):
         pose = replace(pose, rows=np.tile(LEVEL, (len(pose.ns), 1)))
-    velocities = [_velocities(base, twist, i) for i in range(len(base.stretches))]
+    parts = [slice(*np.searchsorted(twist.ns, [begin, end + 1])) for begin, end in base.stretches]
+    velocities = [(twist.ns[inside], twist.rows[inside]) for inside in parts]
     seconds = [(ns - base.ns[0]) / NANOSECONDS for ns, _ in velocities]
     noise = variance(zip(seconds, (nu for _, nu in velocities), strict=True))
     stretches = [
@@ -167,13 +168,6 @@ def told_by(vehicle: Vehicle, velocity: np.ndarray, angles: Sequence[bool]) -> n
     wrench, moved = (resistance(vehicle, x[:, :6], quaternion(x[:, 6:])) for x in (one, other))
     same = np.abs(moved - wrench).max(axis=0) <= SAME * np.abs(wrench).max()
     return same & depends_on_known(vehicle.M, velocity)
-
-
-def _velocities(base: TimeBase, twist: Track, i: int) -> tuple[np.ndarray, np.ndarray]:
-    """Stamps (k,) and velocities (k, 6) inside a stretch."""
-    first, last = base.stretches[i]
-    inside = slice(*np.searchsorted(twist.ns, [first, last + 1]))
-    return twist.ns[inside], twist.rows[inside]
 
 
 def _stretch(
@@ -281,7 +275,8 @@ def _run(
     eta = unwrapped_eta(state)
     eta[:, 3:][:, [angle in lacking for angle in EULER]] = np.nan
     tau = rows.get('wrench', unknown)
-    name = mapping.name or _name_of(bag.resolve())
+    place = bag.resolve()
+    name = mapping.name or UNFIT.sub('_', place.name if place.is_dir() else place.stem)[:100]
     return Run(
         vehicle=vehicle,
         scenario=name,
@@ -308,11 +303,6 @@ def _run(
         applied=rows.get('wrench_applied'),
         **found,
     )
-
-
-def _name_of(bag: Path) -> str:
-    """Name of a bag as a word that may name files."""
-    return UNFIT.sub('_', bag.name if bag.is_dir() else bag.stem)[:100]
 
 
 def _sampled(track: Track, base: TimeBase) -> np.ndarray:

@@ -35,7 +35,7 @@ CANDIDATES = ('odometry', 'pose', 'twist', 'wrench', 'setpoint', 'thrusters')
 ASKED = ('cmd', 'command', 'desired', 'goal', 'ref', 'reference', 'setpoint', 'target')
 THRUSTING = ('actuator', 'actuators', 'esc', 'motor', 'motors', 'propeller', 'propellers', 'pwm',
              'servo', 'servos', 'thrust', 'thruster', 'thrusters', 'thrusts')  # fmt: skip
-DERIVED = ('analysis', 'disturbance')  # neither measured nor commanded
+DERIVED = ('delta', 'disturbance', 'lumped')  # neither measured nor commanded
 TURNS = {'roll': 0, 'phi': 0, 'pitch': 1, 'theta': 1, 'yaw': 2, 'psi': 2, 'heading': 2}
 JOINED = {  # words that are two
     **{f'{kind}{axis}': (kind, axis) for kind in 'vfq' for axis in 'xyz'},
@@ -223,7 +223,7 @@ def candidates(contents: BagContents) -> dict[str, list[str]]:
     states of filters come in arrays as well. What is called wrench is commanded, a disturbance not.
     """
     types = {topic: kind for topic, kind in contents.types.items()
-             if contents.counts.get(topic) and not has_word(topic, DERIVED)}  # fmt: skip
+             if contents.counts.get(topic) and not has_word(role_of(topic), DERIVED)}  # fmt: skip
     found = {role: _fitting(types, role) for role in CANDIDATES}
     whole = set(found['odometry'])
     for role in ('pose', 'twist', 'setpoint'):

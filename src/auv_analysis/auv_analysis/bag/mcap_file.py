@@ -191,10 +191,12 @@ class McapFile:
         finished = False
         for item in self.items():
             if isinstance(item, Lost):
-                if not item.cut:
-                    self._note_damage(item)
-                    return
-                continue
+                if item.cut:
+                    continue
+                if item.start <= len(MAGIC):
+                    raise InputError(self.path, '', 'an MCAP file', item.why)
+                self._notes.append(f'{self.path.name}: {DAMAGED} {item.start}, read up to there')
+                return
             finished = finished or item.opcode == Opcode.FOOTER
             for part in item.parts:
                 if isinstance(part, LongAttachment):
@@ -205,12 +207,6 @@ class McapFile:
         if not finished:
             about = 'was not finished, its writer was killed; read to the end'
             self._notes.append(f'{self.path.name}: {about}')
-
-    def _note_damage(self, lost: Lost) -> None:
-        if lost.start <= len(MAGIC):
-            raise InputError(self.path, '', 'an MCAP file', lost.why)
-        about = f'{DAMAGED} {lost.start}, read up to there'
-        self._notes.append(f'{self.path.name}: {about}')
 
     def _is_new(self, part: McapRecord | MessageTable) -> bool:
         """Whether it is not a channel that is known; keeps definitions."""

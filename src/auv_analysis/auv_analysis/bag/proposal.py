@@ -35,6 +35,7 @@ from auv_analysis.bag.foreign_topics import (
 )
 from auv_analysis.bag.mavlink_presets import CURVE
 from auv_analysis.bag.reading import BagContents
+from auv_analysis.bag.step_topics import role_of
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import yaml_text
 from auv_dynamics.ros.interface import NANOSECONDS
@@ -290,9 +291,10 @@ def proposal(bag: Path, contents: BagContents, looked: Mapping[str, Looked]) -> 
 
 def _entries(role: str, looked: Mapping[str, Looked]) -> list[dict[str, Any]]:
     """Topics that together have the components of a role, those with most of them first."""
-    other = (*DERIVED, *(ASKED if role != 'wrench' else ()))
+    asked = ASKED if role != 'wrench' else ()
     offers = {topic: offered(role, topic, one) for topic, one in looked.items()
-              if len(looked) == 1 or not has_word(topic, other)}  # fmt: skip
+              if len(looked) == 1
+              or not (has_word(topic, asked) or has_word(role_of(topic), DERIVED))}  # fmt: skip
     missing = {name for offer in offers.values() for name in offer}
     chosen: list[dict[str, Any]] = []
     while missing:

@@ -166,7 +166,8 @@ def recover(bag: Path, progress: Progress = lambda *_: None) -> Report:
             report.notes += notes
             return report
     except OSError as error:
-        raise failed(bag, error) from None
+        text = f'{error.filename or bag}: {reason(error)}; the file is as it was'
+        raise FailedError(text) from None
 
 
 def _sources(bag: Path) -> dict[Path, Path]:
@@ -217,7 +218,9 @@ def _recover(bag: Path, sources: dict[Path, Path], progress: Progress) -> Report
             kept = repair(one, target, before, progress)
             report.files.append(FileReport(one, target.name, 'repaired', kept))
         elif one.path == target:
-            kept = set_aside(target)
+            kept = keep(target).name
+            target.unlink(missing_ok=True)
+            sync_folder(target.parent)
             report.files.append(FileReport(one, target.name, 'left out', kept))
     if bag.is_dir():
         report.metadata = _settle_metadata(bag, report)
@@ -365,16 +368,3 @@ def keep(path: Path) -> Path:
         os.rename(path, kept)  # the damaged name, from which the next repair goes on
     sync_folder(path.parent)
     return kept
-
-
-def set_aside(path: Path) -> str:
-    """Take a file out of its bag, since nothing in it can be used."""
-    kept = keep(path)
-    path.unlink(missing_ok=True)
-    sync_folder(path.parent)
-    return kept.name
-
-
-def failed(path: Path, error: OSError) -> FailedError:
-    """Error that ends a repair which the system does not permit."""
-    return FailedError(f'{error.filename or path}: {reason(error)}; the file is as it was')

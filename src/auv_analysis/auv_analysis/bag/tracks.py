@@ -65,11 +65,6 @@ class Track:
         """Median interval, in bursts the mean one between gaps, ns; inf of a single sample."""
         return usual_interval(self.ns, self.limit)
 
-    @property
-    def _interval(self) -> float:
-        """Median interval, ns; inf of a single sample."""
-        return float(np.median(np.diff(self.ns))) if len(self.ns) > 1 else np.inf
-
     def gaps(self) -> np.ndarray:
         """Begin and end of each gap, of any of its topics, (g, 2) ns."""
         if self.parts:
@@ -84,7 +79,7 @@ class Track:
 
     def is_averaged(self, step: int) -> bool:
         """Whether several samples fall into one step, ns, so that single ones would alias."""
-        return step > AVERAGED * self._interval
+        return len(self.ns) > 1 and step > AVERAGED * float(np.median(np.diff(self.ns)))
 
 
 def at_times(track: Track, ns: np.ndarray) -> np.ndarray:

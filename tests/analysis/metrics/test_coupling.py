@@ -13,7 +13,6 @@ from auv_analysis.metrics.coupling import (
     delta_pi,
     delta_xi,
     input_deformation,
-    pieces,
     structural_zeros,
     velocity_deformation,
 )
@@ -115,6 +114,11 @@ def test_many_samples_at_once():
     for function, matrix in ((delta_xi, inverse), (delta_pi, Upsilon)):
         whole = function(matrix, many)
         assert_allclose(whole, [function(matrix, one) for one in many], atol=1e-14)
+
+
+def pieces(weights, signals):
+    """What signal j adds to component i, (31) and (32): signals (..., 6) to (..., 6, 6)."""
+    return weights * signals[..., np.newaxis, :]
 
 
 @QUICK

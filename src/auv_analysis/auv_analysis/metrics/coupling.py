@@ -93,23 +93,6 @@ class Products:
         return np.where(self.known, self.peaks, np.nan).tolist()
 
 
-def pieces(weights: np.ndarray, signals: np.ndarray) -> np.ndarray:
-    """Pieces of (31) or (32) that add to a deformation.
-
-    Parameters
-    ----------
-    weights : (6, 6) of `velocity_deformation` or `input_deformation`
-    signals : (..., 6) nu in m/s, rad/s, or tau in N, N m
-
-    Returns
-    -------
-    pieces : (..., 6, 6); [..., i, j] is what signal j adds to component i, their sum over j the
-        deformation (33) or (34)
-
-    """
-    return weights * signals[..., np.newaxis, :]
-
-
 @np.errstate(over='ignore', invalid='ignore')
 def coupling_terms(weights: np.ndarray, products: Products) -> list[dict[str, Any]]:
     """Pieces of (31) or (32) in figures: which degree of freedom deforms which other, and how much.

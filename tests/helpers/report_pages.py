@@ -27,6 +27,9 @@ class Page(HTMLParser):
         self._value: str | None = None
         self._body = False
         self.feed(text)
+        assert len(set(self.ids)) == len(self.ids), {
+            one for one in self.ids if self.ids.count(one) > 1
+        }
 
     def handle_starttag(self, tag, attributes):
         values = dict(attributes)

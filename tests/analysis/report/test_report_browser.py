@@ -96,7 +96,7 @@ def test_every_control_is_reached_by_the_tabulator(report):
 def test_still_figures_have_the_ground_of_the_page(report, theme):
     report.page.emulate_media(color_scheme=theme)
     report.page.wait_for_selector(f'[data-theme="{theme}"]')
-    image = pixels(report.page.locator('#settling img'))
+    image = pixels(report.page.locator('#figure-settling img'))
     report.page.emulate_media(color_scheme='light')
     assert (np.median(image) > 200) == (theme == 'light')
 
@@ -104,7 +104,7 @@ def test_still_figures_have_the_ground_of_the_page(report, theme):
 def test_the_page_is_small_and_its_panels_replace_the_still_figures(report, report_path):
     assert report_path.stat().st_size < 6_000_000
     assert report.panel('error-linear').is_visible()
-    still = report.page.locator('#errors_gvc img')
+    still = report.page.locator('#figure-errors_gvc img')
     assert not still.is_visible()
     report.page.locator('details.stills summary').first.click()
     assert still.is_visible()
@@ -152,17 +152,17 @@ def test_paper_gets_the_still_figures(report):
 
 def test_without_scripts_the_still_figures_are_there(browser, report_path):
     report = Watched(browser, report_path, java_script_enabled=False)
-    assert report.page.locator('#errors_gvc img').is_visible()
+    assert report.page.locator('#figure-errors_gvc img').is_visible()
     assert not report.page.locator('.panel-controls').is_visible()
     report.close()
 
 
 def test_a_link_opens_what_it_leads_to_and_dark_systems_have_dark_panels(browser, report_path):
-    report = Watched(browser, report_path, '#errors_cl', color_scheme='dark')
+    report = Watched(browser, report_path, '#figure-errors_cl', color_scheme='dark')
     report.page.wait_for_selector('.with-panels')
-    image = report.page.locator('#errors_cl img')
+    image = report.page.locator('#figure-errors_cl img')
     assert image.is_visible()
-    assert 0.0 < report.page.locator('#errors_cl').bounding_box()['y'] < 450.0
+    assert 0.0 < report.page.locator('#figure-errors_cl').bounding_box()['y'] < 450.0
     assert np.median(pixels(report.panel('error-linear'))) < 60
     report.close()
 

@@ -361,7 +361,7 @@ def test_files_are_listed_once_for_the_runs_that_share_them(runs) -> None:
 def test_findings_of_what_the_actuators_left(runs, summaries, largest: str) -> None:
     applied = {n: 0.01 * run.tau[:, :: -1 if largest == 'first' else 1] for n, run in runs.items()}
     acting = {n: replace(run, applied=applied[n]) for n, run in runs.items()}
-    ((text,), *_) = [v for k, v in said(acting, summaries).items() if k == 'inputs_compared']
+    ((text,), *_) = [v for k, v in said(acting, summaries).items() if k == 'figure-inputs_compared']
     peaks = [np.abs(applied[n]).max(axis=0) for n in runs]
     expected = '; '.join(
         f'{p[:3].max():.1f} N and {p[3:].max():.1f} N m under {n}'

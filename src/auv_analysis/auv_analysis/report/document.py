@@ -168,7 +168,7 @@ def names_of(sections: Sequence[Section]) -> dict[str, str]:
     tables = (f'table-{table.name}' for section in sections for table in section.tables)
     figures = (figure.name for section in sections for figure in section.figures if figure.png)
     names |= {anchor: f'table {i}' for i, anchor in enumerate(tables, start=1)}
-    return names | {anchor: f'figure {i}' for i, anchor in enumerate(figures, start=1)}
+    return names | {f'figure-{name}': f'figure {i}' for i, name in enumerate(figures, start=1)}
 
 
 @cache

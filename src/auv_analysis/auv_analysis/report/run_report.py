@@ -303,7 +303,7 @@ def findings(runs: Mapping[str, RunDigest], summaries: Summaries) -> list[Senten
         tau, most = run.part('tau'), summaries[name]['effort']['max']
         if remarks := beyond_authority(run.vehicle, most, (tau.low, tau.high)):
             found.append(Sentence(f'Under {name} {"; ".join(remarks)}.', metrics))
-    found += [Sentence(_applied(runs), 'inputs_compared')]
+    found += [Sentence(_applied(runs), 'figure-inputs_compared')]
     found += [
         Sentence(estimate_finding(n, s), f'table-{ESTIMATES[s["unexplained"] is None]}')
         for n, s in summaries.items()

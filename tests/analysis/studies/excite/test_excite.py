@@ -305,7 +305,8 @@ def test_a_motion_that_is_not_finite_gains_nothing(excited) -> None:
     commands, states = np.tile(command, (1, 3, 1, 1)), np.tile(state, (1, 3, 1, 1))
     states[0, 1, 30, 8], commands[0, 2, 40, 1] = np.nan, np.inf
     request = excited.request
-    found = searching._gained(request, searching._reference(request), Motion(commands, states))
+    u = searching._unknowns(request, np.ones(6), request.bounds.wrench)
+    found = searching._gained(request, u, Motion(commands, states))
     assert found[0] > 0.1
     assert found[1:].tolist() == [0.0, 0.0]
 
@@ -349,8 +350,13 @@ def test_what_leaves_the_bounds_is_said(closed: bool) -> None:
     ):  # fmt: skip
         with pytest.raises(FailedError) as left:
             _check(request, np.array(used))
-        way = ', '.join(ways if closed else [*ways, '--closed-loop']) or 'no option helps'
-        assert str(left.value) == f'{VEHICLE}: {loop} leaves its bounds: {said}: {way}'
+        every = [*ways, *['--closed-loop'] * (not closed)]
+        every += ['a smaller --lag or --step'] * ('wrench' in said)
+        way = f': {", ".join(every)}' if every else ''
+        assert str(left.value) == f'{VEHICLE}: {loop} leaves its bounds: {said}{way}'
+    heavy = request_of('herman2018', closed=closed)  # more than 15 N of it
+    with pytest.raises(FailedError, match=r'allowed: a larger --limit(, --closed-loop)?$'):
+        _check(heavy, np.array([[2.5, 1.2, 0.5, 3.9, 0.5]]))
     with pytest.raises(FailedError) as left:
         _check(request, np.array([[0.5] * 5, [BEYOND] * 5]))
     other = ' or --lag' if closed else ''
@@ -678,6 +684,9 @@ def test_axes_that_may_not_be_driven_are_not(closed: bool) -> None:
         assert not commands[..., 2:5].any(), 'the law would hold depth and level'
         assert commands[..., [0, 1, 5]].any()
     assert request.clipped == closed
+    loop = 'closed loop, in which nothing drives heave, roll and pitch,' if closed else 'open loop'
+    with pytest.raises(FailedError, match=f'the {loop} leaves its bounds'):
+        _check(request, np.array([[0.5, 0.5, 0.5, 3.9, 0.5]]))
     names = searching._unknowns(request, np.ones(6), wrench).names
     assert ('lag' in names) != closed, 'what acts has none'
     found = SimpleNamespace(request=request, scenario={})

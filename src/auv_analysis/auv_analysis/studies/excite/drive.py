@@ -274,10 +274,9 @@ def spec_of(wave: Harmonics) -> dict[str, Any]:
             dict(zip(('amplitude', 'omega', 'phase'), map(_short, row), strict=True))
             for row in wave.terms[i].tolist() if row[0] != 0.0
         ]  # fmt: skip
-        entry = {'offset': _short(wave.offset[i])} if wave.offset[i] else {}
-        if entry or terms:
-            found[dof] = {**entry, **({'terms': terms} if terms else {})}
-    return found
+        entry = {'offset': _short(wave.offset[i]), 'terms': terms}
+        found[dof] = {key: value for key, value in entry.items() if value}
+    return {dof: entry for dof, entry in found.items() if entry}
 
 
 def _short(value: float) -> float:

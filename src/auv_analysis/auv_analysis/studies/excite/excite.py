@@ -38,6 +38,7 @@ from auv_analysis.studies.identify.unknowns import Unknowns, unknowns
 from auv_analysis.studies.optimise import Search, sobol_points
 from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.plant.disturbance import Harmonics
+from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.model import Model
 from auv_dynamics.vehicle.vehicle import Vehicle, make_model
 from auv_gvc_controller.laws.multisine import MOST
@@ -94,11 +95,7 @@ def planned(
     request : what is asked for; length and bounds of the open loop are those below
     lengths : s
     bounds : of speed and rate that must be allowed, m/s and rad/s
-    tick : as of `excite`
-
-    Raises
-    ------
-    InputError, FailedError : as of `excite`, which is told of the last length
+    tick : as of `excite`, which also has what is raised, of the last length
 
     """
     drawn = _drawn(request)
@@ -139,7 +136,8 @@ def excite(
         found = ', '.join(f'{value:g}' for value in request.hold)
         expected = 'more than what holds the vehicle still, in some degree of freedom'
         raise InputError('--limit', '', expected, f'still with {found} N, N m')
-    u = _reference(request)
+    speeds = np.repeat([request.bounds.speed, request.bounds.rate], 3) / 3.0
+    u = _unknowns(request, speeds, request.bounds.wrench / 3.0)  # units that all candidates share
     if not u.entries:
         raise InputError('--free', '', 'a coefficient that is free', 'none')
 
@@ -149,9 +147,8 @@ def excite(
         return np.concatenate([-_gained(request, u, motion)[None], np.log(RESERVE / used.T)])
 
     low, high = families[0].box
-    middle = np.zeros((1, len(low)))
-    least = middle.copy()
-    least[:, : len(families[0].driven)] = np.log(LEAST)
+    least = np.repeat([[np.log(LEAST), 0.0]], len(families[0].driven), axis=1)
+    middle = np.zeros_like(least)
     motion = motion_of(request, families[0].waves(least), *many)
     _check(request, request.bounds.used(motion)[:, 0])  # what leaves them undriven always does
     gained = []
@@ -222,13 +219,6 @@ def within(
         good = fits(middle)
         low, high = np.where(good, middle, low), np.where(good, high, middle)
     return moved(low)
-
-
-def _reference(request: Request) -> Unknowns:
-    """Unknowns in units that all candidates have in common."""
-    bounds = request.bounds
-    speeds = np.repeat([bounds.speed, bounds.rate], 3) / 3.0
-    return _unknowns(request, speeds, bounds.wrench / 3.0)
 
 
 def _unknowns(request: Request, speeds: np.ndarray, wrenches: np.ndarray) -> Unknowns:
@@ -348,11 +338,12 @@ def prediction(request: Request, commands: np.ndarray, states: np.ndarray) -> Id
 
 def of_case1(request: Request) -> Identified | None:
     """The same for case 1 of the paper, scaled to the vehicle, of the same length."""
-    data = scaled_case1(request.given)
-    keys = ('format', 'name', 'vehicle', 'setpoint')
-    data = {key: data[key] for key in keys if key in data}
-    data |= {'controllers': {'gvc': request.loop}, 'actuators': {'lag': request.lag}}
-    data |= {'duration': request.duration, 'step': request.step}
+    scaled = scaled_case1(request.given)
+    data = {
+        'name': scaled['name'], 'vehicle': scaled['vehicle'], 'setpoint': scaled['setpoint'],
+        'controllers': {'gvc': request.loop}, 'actuators': {'lag': request.lag},
+        'duration': request.duration, 'step': request.step,
+    }  # fmt: skip
     commands, states = recorded(scenario_in_memory(request, data), 'gvc')
     if not np.isfinite(states).all():
         return None
@@ -364,14 +355,19 @@ def _check(request: Request, used: np.ndarray) -> None:
     worst = used.max(axis=0)
     if np.all(worst <= 1.0):
         return
+    wrench = request.bounds.wrench
     said = f'{request.vehicle.name}: the {"closed" if request.closed else "open"} loop'
+    if request.clipped:
+        said += f', in which nothing drives {join([DOFS[i] for i in np.flatnonzero(wrench == 0)])},'
     if worst.max() >= BEYOND:
         raise FailedError(f'{said} diverges: a smaller --step{" or --lag" * request.closed}')
     over = [0] if worst[0] > 1.0 else np.flatnonzero(worst > 1.0).tolist()  # it limits the rest
     wider, near = [WIDER[k] for k in over], bool(used[0].max() <= 1.0)
     ways = [f'a larger {join(wider)}'] * all(wider) + ['a smaller --spread'] * near
     ways += ['--closed-loop'] * (not request.closed)
+    if over == [0] and np.all(np.abs(request.hold) <= wrench):  # it may be the loop that swings
+        ways.append('a smaller --lag or --step')
     whose = 'a vehicle near the prior' if near else 'the vehicle, or one near it,'
     shares = join([f'{worst[k]:.3g} times the {WORDS[k]}' for k in over])
-    raise FailedError(f'{said} leaves its bounds: {whose} takes {shares} that is allowed: '
-                      + (', '.join(ways) or 'no option helps'))  # fmt: skip
+    raise FailedError(f'{said} leaves its bounds: {whose} takes {shares} that is allowed'
+                      + f': {", ".join(ways)}' * bool(ways))  # fmt: skip

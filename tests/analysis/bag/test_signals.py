@@ -185,6 +185,17 @@ def test_the_rate_of_an_attitude_is_none_in_its_gaps() -> None:
     assert notes[0].startswith('/p: the angular velocity is the rate of its attitude')
 
 
+def test_the_rate_of_an_attitude_is_none_across_a_reset() -> None:
+    t = np.arange(60) * SECOND // 10
+    half = 0.25 * t / SECOND - 0.5 * (np.arange(60) >= 30)
+    rows = np.column_stack([np.zeros((60, 3)), np.cos(half), np.zeros((60, 2)), np.sin(half)])
+    pose = Track('pose', '/p', t, rows, SECOND, held=False)
+    ns = np.arange(119) * SECOND // 20
+    found = with_rates(Track('twist', '/v', ns, np.zeros((119, 6)), SECOND, held=False), pose, [])
+    assert_array_equal(found.ns, np.delete(ns, 59))
+    assert_allclose(found.rows[:, 3:], [[0, 0, 0.5]] * 118, atol=1e-9)
+
+
 @pytest.mark.parametrize(('frames', 'ids', 'axes', 'said'), [
     (None, ('odom_ned', 'base_frd'), 'ned_fsd', 0), (None, ('odom_ned', ''), 'ned_fsd', 0),
     ('enu_flu', ('odom_ned', 'base'), 'enu_flu', 1), ('ned_fsd', ('odom_ned', 'x'), 'ned_fsd', 0),

@@ -24,6 +24,7 @@ from auv_analysis.bag.tracks import (
     at_times,
     between_gaps,
     in_seconds,
+    jumps,
 )
 from auv_analysis.metrics.local_polynomials import SMALLEST, rates
 from auv_analysis.metrics.pose_twist import CONJUGATE, turn, turned
@@ -256,7 +257,7 @@ def with_rates(twist: Track, pose: Track, notes: list[str]) -> Track:
     notes : gets a line
 
     """
-    angular = np.full((len(twist.ns), 3), np.nan)
+    angular, pose = np.full((len(twist.ns), 3), np.nan), replace(pose, resets=jumps(pose))
     for first, last in between_gaps(int(pose.ns[0]), int(pose.ns[-1]), (pose,)):
         inside = slice(*np.searchsorted(pose.ns, [first, last + 1]))
         asked = slice(*np.searchsorted(twist.ns, [first, last + 1]))

@@ -5,14 +5,20 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, median_filter
 from scipy.spatial.transform import Rotation, Slerp
 
 from auv_analysis.bag.foreign_fields import COMPONENTS
+from auv_analysis.metrics.local_polynomials import SMALLEST
+from auv_analysis.metrics.pose_twist import turned
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.interface import NANOSECONDS
 
 BURST = 0.2  # of the mean interval: shorter ones are those of a burst
 AVERAGED = 1.5  # intervals per step of the time base from which a signal is averaged over the step
+JUMP = 0.02  # rad, m/s, rad/s between two samples: less is none
+BEYOND, NEARBY = 4.0, 2.0  # times the largest other change within s: less is none
+QUICK = 0.25  # s between samples that show a jump
 ENOUGH = 12  # velocity samples of a stretch, fewer are left out: no rate could be estimated
 
 
@@ -95,8 +101,8 @@ def at_times(track: Track, ns: np.ndarray) -> np.ndarray:
         return _lines(seconds, track.rows, at)
     at = np.clip(at, seconds[0], seconds[-1])
     w, *xyz = track.rows[:, 3:].T
-    turned = Slerp(seconds, Rotation.from_quat(np.stack([*xyz, w], axis=1)))(at).as_quat()
-    attitude = turned[:, [3, 0, 1, 2]]
+    slerp = Slerp(seconds, Rotation.from_quat(np.stack([*xyz, w], axis=1)))
+    attitude = slerp(at).as_quat()[:, [3, 0, 1, 2]]
     return np.concatenate([_lines(seconds, track.rows[:, :3], at), attitude], axis=1)
 
 
@@ -218,6 +224,33 @@ def between_gaps(begin: int, end: int, tracks: Sequence[Track]) -> list[tuple[in
     if end > place:
         found.append((place, end))
     return found
+
+
+def jumps(track: Track) -> np.ndarray:
+    """Stamps (r, 2), ns, between which an attitude, or another column, changes as never nearby.
+
+    What the motion around it tells is taken off. Noise, kinks and quanta recur within seconds, and
+    what one sample is off by the next one takes back. Where a column repeats its values, only its
+    changes are looked at. Over a long interval a vehicle itself may do what looks like a jump.
+    """
+    found = [np.zeros((0, 2), np.int64)]
+    for column in (turned(track.rows[:, 3:]) if track.role == 'pose' else track.rows).T:
+        there = np.isfinite(column)
+        change, times = np.diff(column[there]), track.ns[there]
+        moved = np.flatnonzero(change)
+        apart = np.stack([times[moved], times[moved + 1]], axis=1)
+        change, period = change[moved], usual_interval(apart[:, 1] / NANOSECONDS)
+        if period > QUICK:
+            continue
+        length = np.maximum(np.ptp(apart, axis=1) / NANOSECONDS, period)
+        quantum = np.quantile(np.abs(change), 0.1) if len(moved) < there.sum() - 1 else 0.0
+        change = np.abs(change - median_filter(change / length, SMALLEST) * length)
+        half = int(np.clip(NEARBY / 2 / period, SMALLEST // 2, len(change)))  # on either side
+        largest = maximum_filter1d(np.pad(change, half + 1), 2 * half + 1)
+        near = np.maximum(np.maximum(largest[: len(change)], largest[2 * half + 2 :]), quantum)
+        allowed = np.maximum(BEYOND * near * length / period, JUMP)
+        found.append(apart[(change > allowed) & (length < QUICK)])
+    return np.concatenate(found)
 
 
 def assembled(parts: Sequence[Track], bag: Path) -> Track:

@@ -172,10 +172,11 @@ def turning(t: np.ndarray, yaw: float = 0.0, sway: float = 0.0) -> dict[str, Tra
     """Noise on yaw and sway, at times in s; behind 6 s they are so much more, as by a reset."""
     given = tracks(dict.fromkeys(ROWS, np.rint(1e9 * t).astype(np.int64)))
     rng, late = np.random.default_rng(0), t > 6.01
-    given['twist'].rows[:] = rng.normal(0.0, 0.005, (len(t), 6))
-    given['twist'].rows[:, [1, 5]] += 0.2 * np.cos(t)[:, None]
-    given['twist'].rows[:, 1] += sway * late
-    half = (0.2 * np.sin(t) + yaw * late + rng.normal(0.0, 0.003, len(t))) / 2.0
+    twist = given['twist'].rows
+    twist[:] = rng.normal(0.0, 0.005, (len(t), 6))
+    twist[:, [1, 5]] += np.stack([0.2 * np.cos(t) + sway * late, 1.0 + 0.2 * np.cos(t)], axis=1)
+    twist[::7, 1] = np.nan
+    half = (t + 0.2 * np.sin(t) + yaw * late + rng.normal(0.0, 0.003, len(t))) / 2.0
     given['pose'].rows[:, [3, 6]] = np.stack([np.cos(half), np.sin(half)], axis=1)
     return given
 
@@ -200,21 +201,21 @@ def test_rates_are_held_against_the_attitude_within_a_stretch():
 
 
 @pytest.mark.parametrize(('period', 'sway'), [
-    (0.02, lambda t, y: y),
-    (0.02, lambda t, y: np.round(y / 0.05) * 0.05),
-    (0.02, lambda t, _: np.round(4.0 * np.cos(0.3 * t)) * 0.05),  # quanta that come seldom
-    (0.02, lambda t, y: (y + 4.0 * (t > 6.0))[np.arange(len(t)) // 50 * 50] / 20.0),  # repeated
-    (0.02, lambda t, y: y + (np.arange(len(t)) % 270 == 7)),  # spikes
-    (0.02, lambda t, y: np.where(np.sin(700.0 * t) > 0.5, np.nan, y)),
-    (0.02, lambda t, y: np.abs(t % 4.0 - 2.0)),  # as by thrusters that turn round
-    (0.20, lambda t, y: np.where(t < 6.0, 0.0, 0.3 - 0.3 * np.exp(5.0 * (6.0 - t)))),
-    (0.50, lambda t, y: np.where(t < 6.0, 0.0, 0.3)),
+    (0.02, lambda t, e: 0.2 * np.cos(t) + e),
+    (0.02, lambda t, e: 0.2 * np.cos(t) + 0.02 * e + 0.015 * (t > 6.0)),  # little
+    (0.02, lambda t, e: 0.2 * np.cos(t) + e + (np.arange(len(t)) % 270 == 7)),  # spikes
+    (0.02, lambda t, e: np.where(t % 4.3 < 0.15, np.nan, 0.3 * np.sin(5.0 * t))),  # drop-outs
+    (0.02, lambda t, e: np.round((0.3 * t + 0.1 * np.sin(1.3 * t) + 0.4 * e) / 0.03) * 0.03),
+    (0.02, lambda t, e: np.round(4.0 * np.cos(0.3 * t)) * 0.05),  # quanta, here such as come seldom
+    (0.02, lambda t, e: (e + 0.2 * (t > 6.0))[np.arange(len(t)) // 50 * 50]),  # repeated
+    (0.02, lambda t, e: np.abs(t % 4.0 - 2.0)),  # thrusters that turn round
+    (0.20, lambda t, e: np.where(t < 6.0, 0.0, 0.3 - 0.3 * np.exp(5.0 * (6.0 - t)))),
+    (0.50, lambda t, e: e + 0.3 * (t > 6.0)),  # in a long time
 ])  # fmt: skip
 def test_what_noise_sensors_and_thrusters_do_is_no_jump(period, sway):
     t = np.arange(0.0, 20.0, period)
-    t = t[np.cos(40.0 * t * t) < 0.7]  # with drop-outs
     given = turning(t)
-    given['twist'].rows[:, 1] = sway(t, given['twist'].rows[:, 1])
+    given['twist'].rows[:, 1] = sway(t, np.random.default_rng(3).normal(0.0, 0.005, len(t)))
     cut, notes = cut_at_jumps(given)
     assert (notes, len(cut['pose'].resets)) == ([], 0)
 

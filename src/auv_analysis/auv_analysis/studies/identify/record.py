@@ -5,11 +5,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from auv_analysis.bag.tracks import Track, between_gaps, integral, usual_interval
+from auv_analysis.bag.tracks import Track, between_gaps, integral, jumps, usual_interval
 from auv_analysis.metrics.local_polynomials import ORDER, SMALLEST, variance, weights, windows
-from auv_analysis.metrics.pose_twist import turned
 from auv_dynamics.kernel.compile import plain
 from auv_dynamics.ros.interface import NANOSECONDS, WRENCH
 from auv_dynamics.vehicle.model import down
@@ -19,9 +17,6 @@ SMOOTHING = 0.4  # s, window of the local polynomials from which states are read
 PAUSE = 0.5  # s without a measurement of something that end no stretch where no gap was told
 SHORTEST = 1.0  # s of a record
 ROUNDED = 1e-12  # m/s, rad/s, rad
-JUMP = 0.02  # rad, m/s, rad/s between two samples: less is none
-BEYOND, NEARBY = 4.5, 2.0  # times the largest other change within s: less is none
-QUICK = 0.25  # s between samples that show a jump
 FEW = 3  # jumps whose times are named
 EVEN = 0.5  # of the mean interval: where all lie within, clocks jitter but no sample lacks
 
@@ -147,12 +142,10 @@ def cut_at_jumps(
     role : of the wrench
 
     """
-    pose, twist = tracks['pose'], tracks['twist']
-    found = {'attitude': _jumps(pose.ns, turned(pose.rows[:, 3:])),
-             'velocity': _jumps(twist.ns, twist.rows)}  # fmt: skip
+    found = {'attitude': jumps(tracks['pose']), 'velocity': jumps(tracks['twist'])}
     resets, notes = np.concatenate(list(found.values())), []
-    for name, jumps in found.items():
-        at = (np.unique(jumps[:, 1]) - _origin(tracks, role)) / NANOSECONDS
+    for name, where in found.items():
+        at = (np.unique(where[:, 1]) - _origin(tracks, role)) / NANOSECONDS
         times = ', '.join(f'{t:.4g}' for t in at[:FEW])
         later = ' and later' * (len(at) > FEW)
         if times:
@@ -164,33 +157,6 @@ def cut_at_jumps(
 def _origin(tracks: Mapping[str, Track], role: str) -> int:
     """When times of records begin, ns."""
     return int(min(tracks[name].ns[0] for name in ('pose', 'twist', role)))
-
-
-def _jumps(ns: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Stamps (r, 2), ns, between which a column of (n, k) changes far more than anywhere nearby.
-
-    What the motion around it tells is taken off. Noise, kinks and quanta recur within seconds, and
-    what one sample is off by the next one takes back. Where a column repeats its values, only its
-    changes are looked at. Over a long interval a vehicle itself may do what looks like a jump.
-    """
-    found = [np.zeros((0, 2), np.int64)]
-    for column in rows.T:
-        there = np.isfinite(column)
-        change, times = np.diff(column[there]), ns[there]
-        moved = np.flatnonzero(change)
-        apart = np.stack([times[moved], times[moved + 1]], axis=1)
-        length, change = np.ptp(apart, axis=1) / NANOSECONDS, change[moved]
-        period = usual_interval(apart[:, 1] / NANOSECONDS)
-        if period > QUICK:
-            continue
-        rate = uniform_filter1d(change, SMALLEST) / uniform_filter1d(length, SMALLEST)
-        change = np.abs(change - rate * length)
-        half = int(np.clip(NEARBY / 2 / period, SMALLEST // 2, len(change)))  # on either side
-        largest = maximum_filter1d(np.pad(change, half + 1), 2 * half + 1)
-        near = np.maximum(largest[: len(change)], largest[2 * half + 2 :])
-        allowed = BEYOND * near * np.maximum(length / period, 1.0)
-        found.append(apart[(change > np.maximum(allowed, JUMP)) & (length < QUICK)])
-    return np.concatenate(found)
 
 
 def long_enough(records: Sequence[Record]) -> list[Record]:

@@ -35,15 +35,15 @@ T = np.linspace(0, 30, 301)
 COMMENT = """\
 # yaml-language-server: $schema=../../src/auv_dynamics/auv_dynamics/plant/scenario.schema.json
 #
-# Case 1 of Herman 2018 on {name}: what do the paper's gains do on another vehicle?
-# Kept from case1: controllers with their gains, duration, step.
+# Case 1 of Herman 2018 on {name}: how do the paper's gains perform on another vehicle?
+# As in case1: controllers with their gains, duration, step.
 # Set-point (35) times {factor}: at most {surge:g} m/s in surge, {heave:g} m/s in heave and
-# {yaw:g} rad/s in yaw, for every shipped vehicle. Top speed of this one: {speed}.
-# All six degrees of freedom count as actuated, as in the paper. A torpedo-shaped vehicle has
-# nothing to heave with: there it is an experiment on paper.
+# {yaw:g} rad/s in yaw, for every shipped vehicle. Top speed of {name}: {speed}.
+# All six degrees of freedom count as actuated, as in the paper, although a torpedo-shaped
+# vehicle has no actuator in heave.
 # Disturbance (39): the same acceleration a(t) for every vehicle, F = M a(t).
 {scale}
-# Written by tests/analysis/scenario/test_scaling.py, which holds the two together.
+# Generated and checked by tests/analysis/scenario/test_scaling.py.
 """
 
 

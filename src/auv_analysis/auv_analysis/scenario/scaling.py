@@ -12,15 +12,15 @@ from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
 REFERENCE = 'herman2018'  # the vehicle that case1 was made for
 SCALE = f"""\
-scale, 6x6: F = scale F_39, where F_39 is (39) as printed, in N and N m. It is M M_ref^-1
-with M of this vehicle and M_ref of {REFERENCE}, and no coupling of the water: row i says how
-much of each entry of F_39, surge to yaw, acts in degree of freedom i.
+scale, 6x6: F = scale F_39, where F_39 is (39) as printed, in N and N m. scale is M M_ref^-1
+with M of this vehicle and M_ref of {REFERENCE}, not a coupling by the water: row i holds the
+weights of the entries of F_39, surge to yaw, in degree of freedom i.
 """.splitlines()  # for a comment on the `scale` of a scaled disturbance
 SLOWER = 0.5  # of the set-point (35): 0.6 m/s in surge, 0.8 m/s in heave, 0.05 rad/s in yaw
 OF_MASS = {'gvc': ('k_I',), 'cl': ('k_D', 'k_I', 'Gamma')}  # gains of case1 in N and N m
 GAINS = f"""\
-Gains in N and N m are those of case1 times M_ii of this vehicle over that of {REFERENCE}, degree
-of freedom by degree of freedom, so that both loops are as fast.
+Gains in N and N m are those of case1 times M_ii of this vehicle over that of {REFERENCE} in each
+degree of freedom, so that both loops are equally fast.
 """.splitlines()  # for a comment
 DIGITS = 10  # of a written scale: the last ones differ between BLAS libraries
 ROUNDING = 1e-12  # relative to the largest entry, below which an entry of the scale is zero

@@ -11,7 +11,7 @@ from auv_dynamics.ros.codec import Codec, first_stamp
 from auv_dynamics.ros.interface import BadMessageError, Frames
 from auv_gvc_controller.control.controller import OutputStage, Timeouts, VelocityController
 from auv_gvc_controller.control.odometry_guard import Limits, Now, OdometryGuard, StampAge
-from auv_gvc_controller.control.sampled import SampledLaw
+from auv_gvc_controller.control.sampled_law import SampledLaw
 from auv_gvc_controller.control.setpoint_buffer import DIFFERENCE, SetpointBuffer
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model

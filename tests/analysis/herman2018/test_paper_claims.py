@@ -151,7 +151,7 @@ FIRST, SECOND = [0.1, 0.1, 0.1, 0.2, 0.3, 0.1], [0.1, 0.1, 0.1, 0.4, 0.3, 0.1]
         (SECOND, SECOND, 'partly'),  # the coupling alone
     ],
 )
-def test_claim_15_goes_by_its_rule(gains, others, verdict):
+def test_claim_15_goes_by_its_criterion(gains, others, verdict):
     known = evidence()['case1']
     claim = judged({'case1': replace(known, responses=responses(gains, others))})[14]
     assert claim.verdict == verdict

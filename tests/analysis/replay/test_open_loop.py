@@ -21,7 +21,7 @@ from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.ros.settings import name_of
-from auv_gvc_controller.control.sampled import SampledLaw
+from auv_gvc_controller.control.sampled_law import SampledLaw
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model
 

@@ -11,7 +11,7 @@ from auv_analysis import load_scenario, simulate
 from auv_dynamics import load_vehicle
 from auv_dynamics.vehicle.thrusters import make_reach
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
-from auv_gvc_controller.control.sampled import SampledLaw, anti_windup
+from auv_gvc_controller.control.sampled_law import SampledLaw, anti_windup
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model
 

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from auv_dynamics import load_vehicle
 from auv_gvc_controller.control.controller import OutputStage, Timeouts, VelocityController
 from auv_gvc_controller.control.odometry_guard import ZERO, Limits, Now, OdometryGuard
-from auv_gvc_controller.control.sampled import SampledLaw
+from auv_gvc_controller.control.sampled_law import SampledLaw
 from auv_gvc_controller.control.setpoint_buffer import (
     DIFFERENCE,
     SAME,

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from auv_dynamics import load_vehicle
 from auv_dynamics.kernel.compile import plain
 from auv_dynamics.vehicle.thrusters import make_reach
-from auv_gvc_controller.control.sampled import SampledLaw, cut
+from auv_gvc_controller.control.sampled_law import SampledLaw, cut
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model
 from auv_gvc_controller.laws.pid import PID

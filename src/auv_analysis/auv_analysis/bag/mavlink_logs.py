@@ -6,8 +6,8 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from auv_analysis.bag.dataflash_log import DataFlashLog
 from auv_analysis.bag.metadata import BAG, LOGS, TopicExtent
-from auv_analysis.bag.onboard_log import OnboardLog
 from auv_analysis.bag.reading import BagContents
 from auv_analysis.bag.telemetry_log import Message, TelemetryLog
 from auv_dynamics.files.errors import InputError, refusing
@@ -60,11 +60,11 @@ def too_slow(topic: str, tally: TopicExtent) -> list[str]:
 
 
 @contextmanager
-def _opened(path: Path) -> 'Iterator[TelemetryLog | OnboardLog]':
+def _opened(path: Path) -> 'Iterator[TelemetryLog | DataFlashLog]':
     if not os.path.isfile(path):
         raise InputError(path, '', BAG, 'no such file')
     _library()
-    kind = TelemetryLog if path.suffix.lower() == LOGS[0] else OnboardLog
+    kind = TelemetryLog if path.suffix.lower() == LOGS[0] else DataFlashLog
     with refusing(path, '', 'a file that can be read'), path.open('rb') as file:
         size = file.seek(0, 2)
         if not size:

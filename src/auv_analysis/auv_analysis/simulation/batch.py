@@ -36,7 +36,7 @@ from auv_dynamics.kernel.lanes import (
 from auv_dynamics.plant.actuators import memory
 from auv_dynamics.plant.devices import history_shape
 from auv_dynamics.plant.plant import SIZE
-from auv_gvc_controller.control.sampled import user_law
+from auv_gvc_controller.control.sampled_law import user_law
 from auv_gvc_controller.laws.law import SHIPPED
 
 Known = Callable[[np.ndarray], Tables]  # stage times t (T, s) of the next block -> its tables

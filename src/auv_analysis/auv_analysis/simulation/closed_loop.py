@@ -22,7 +22,7 @@ from auv_dynamics.plant.plant import (
     fill_unit_attitude,
 )
 from auv_dynamics.plant.uncertainty import PlantModel, lumped
-from auv_gvc_controller.control.sampled import (
+from auv_gvc_controller.control.sampled_law import (
     AntiWindup,
     fill_sample,
     state_rate,

@@ -28,7 +28,7 @@ from auv_dynamics.plant.actuators import memory
 from auv_dynamics.plant.devices import WIDTH, SensorNoise, history_shape
 from auv_dynamics.plant.faults import FaultRows
 from auv_dynamics.plant.plant import SIZE, Plant, initial_state, unwrapped_eta
-from auv_gvc_controller.control.sampled import SampledLaw, anti_windup, is_compiled
+from auv_gvc_controller.control.sampled_law import SampledLaw, anti_windup, is_compiled
 from auv_gvc_controller.control.setpoint import Setpoint
 from auv_gvc_controller.laws.model import control_model
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from auv_gvc_controller.control.odometry_guard import UNTIMED, ZERO, Now, OdometryGuard
-from auv_gvc_controller.control.sampled import SampledLaw
+from auv_gvc_controller.control.sampled_law import SampledLaw
 from auv_gvc_controller.control.setpoint_buffer import Reference, ReferenceFilter, SetpointBuffer
 
 FEWEST = 10  # answers over which a law engages at least, however rare they are

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from auv_dynamics.vehicle import DOFS
-from auv_gvc_controller.control.sampled import user_law
+from auv_gvc_controller.control.sampled_law import user_law
 from auv_gvc_controller.laws.law import SHIPPED
 from auv_gvc_controller.laws.model import ControlModel
 

@@ -16,7 +16,7 @@ from auv_dynamics.vehicle.thrusters import SATURATIONS, SCALED, AttainableWrench
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_gvc_controller.control.controller import OutputStage, Timeouts, VelocityController
 from auv_gvc_controller.control.odometry_guard import AUTO, CLOCKS, Limits, OdometryGuard, StampAge
-from auv_gvc_controller.control.sampled import SampledLaw
+from auv_gvc_controller.control.sampled_law import SampledLaw
 from auv_gvc_controller.control.setpoint_buffer import (
     DIFFERENCE,
     FILTER,

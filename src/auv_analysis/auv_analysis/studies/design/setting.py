@@ -19,7 +19,7 @@ from auv_analysis.studies.design.prediction import Sizes, sizes_of
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import check, matrix6, read_text, read_yaml, yaml_text
 from auv_dynamics.plant.parameters import SCHEMA
-from auv_gvc_controller.control.sampled import is_compiled
+from auv_gvc_controller.control.sampled_law import is_compiled
 
 PREFIX = 'design_'  # of its name: nobody shall take it for the vehicle that it came from
 WAYS = (('forward', 'aft'), ('to starboard', 'to port'), ('down', 'up'))

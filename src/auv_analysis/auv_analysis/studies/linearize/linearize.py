@@ -15,7 +15,7 @@ from auv_dynamics.vehicle.kinematics import jacobian as kinematics
 from auv_dynamics.vehicle.kinematics import quaternion
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
-from auv_gvc_controller.control.sampled import (
+from auv_gvc_controller.control.sampled_law import (
     anti_windup,
     compiled_sample,
     fill_sample,

@@ -1,4 +1,4 @@
-"""Rules that judge the 21 claims, each from the evidence alone."""
+"""Criteria by which the 21 claims are judged, each from the evidence alone."""
 
 import numpy as np
 

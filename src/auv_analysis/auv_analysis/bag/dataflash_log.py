@@ -1,4 +1,4 @@
-"""On-board logs of ArduPilot (.BIN): records whose types the log defines itself.
+"""DataFlash logs of ArduPilot (.BIN): records whose types the log defines itself.
 
 pymavlink knows how fields are packed. Records are looked for here, so that a file takes no more
 memory than it has kinds of messages, whatever is in it.
@@ -25,7 +25,7 @@ WHOLE = 'BbM'  # formats of one byte
 
 @dataclass
 class Format:
-    """A type of message as an on-board log defines it.
+    """A type of message as a DataFlash log defines it.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ def _value(value: Any, scale: float | None) -> Any:
 
 @dataclass
 class Record:
-    """Where a record of an on-board log lies: its type, first byte and time in us."""
+    """Where a record of a DataFlash log lies: its type, first byte and time in us."""
 
     format: Format
     start: int
@@ -73,7 +73,7 @@ class Record:
 
 
 @dataclass
-class OnboardLog:
+class DataFlashLog:
     """A .BIN of the autopilot: records whose types the log defines itself.
 
     Parameters

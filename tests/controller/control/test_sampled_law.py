@@ -13,7 +13,7 @@ from auv_dynamics import load_vehicle
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.kernel.compile import uncached
 from auv_dynamics.vehicle.kinematics import quaternion
-from auv_gvc_controller.control.sampled import SampledLaw, state_rate, user_law
+from auv_gvc_controller.control.sampled_law import SampledLaw, state_rate, user_law
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model
 

@@ -117,7 +117,8 @@ class Process:
     def send_signal(self, number: int) -> None:
         """Send a signal, where it still runs."""
         if self.poll() is None:
-            os.kill(self.pid, number)
+            with contextlib.suppress(ProcessLookupError):  # the server waited for it just now
+                os.kill(self.pid, number)
 
     def terminate(self) -> None:
         """Ask it to end."""

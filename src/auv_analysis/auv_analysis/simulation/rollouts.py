@@ -206,8 +206,8 @@ def batch_of(variants: Variants, hold: Hold) -> Batch:
         steps=first.steps,
         integrator=first.data['integrator'],
         hold=hold,
-        shared=_shared(variants),
-        own=lambda vehicles: _own(variants, vehicles),
+        shared=_shared(variants, hold),
+        own=lambda vehicles: _own(variants, vehicles, hold),
     )
 
 
@@ -220,16 +220,16 @@ def _peak(setpoint: Setpoint, scenario: Scenario) -> np.ndarray:
     return largest
 
 
-def _shared(variants: Variants) -> Known | None:
+def _shared(variants: Variants, hold: Hold) -> Known | None:
     """Tables of all vehicles where they are the same."""
     first, *others = variants.scenarios
     own = variants.setpoint or first.senses or first.faults.entries
     if own or any(s.texts != first.texts for s in others):
         return None
-    return lambda t: tables(first, t)
+    return lambda t: tables(first, t, hold=hold)
 
 
-def _own(variants: Variants, vehicles: range) -> Known:
+def _own(variants: Variants, vehicles: range, hold: Hold) -> Known:
     """Tables of some vehicles, each with its own."""
     used = [variants.scenarios[variants.of[i]] for i in vehicles]
     seeded = [(s, int(variants.seeds[i])) for s, i in zip(used, vehicles, strict=True)]
@@ -238,8 +238,8 @@ def _own(variants: Variants, vehicles: range) -> Known:
 
     def references(t: np.ndarray) -> np.ndarray:
         if varying is not None:
-            return reference(varying, t)
-        of_each = _once(used, 0, lambda s: reference(s.setpoint, t))
+            return reference(varying, t, hold)
+        of_each = _once(used, 0, lambda s: reference(s.setpoint, t, hold))
         return np.stack([of_each[s.texts[0]] for s in used])
 
     def known(t: np.ndarray) -> Tables:

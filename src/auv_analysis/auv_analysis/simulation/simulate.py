@@ -121,12 +121,12 @@ def tables(
     rows = np.zeros((0, WIDTH)) if noise is None else noise.rows(len(t))
     failing = np.zeros((0, 0)) if faults is None else faults.rows(len(t))
     known = scenario.uncertainty.tables(t)
-    asked = reference(scenario.setpoint, t[:, :1] if hold == 'zoh' else t)
-    return Tables(asked, *known, rows, failing)
+    return Tables(reference(scenario.setpoint, t, hold), *known, rows, failing)
 
 
-def reference(setpoint: Setpoint, t: np.ndarray) -> np.ndarray:
-    """nu_d and nu_d_dot (..., T, s, 12) at the stage times t (T, s)."""
+def reference(setpoint: Setpoint, t: np.ndarray, hold: Hold) -> np.ndarray:
+    """nu_d and nu_d_dot (..., T, s, 12) at the stage times t (T, s); at the first alone if held."""
+    t = t[:, :1] if hold == 'zoh' else t
     return np.concatenate([setpoint.value(t), setpoint.derivative(t)], axis=-1)
 
 

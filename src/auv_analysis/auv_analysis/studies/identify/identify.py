@@ -400,7 +400,7 @@ def _bias(fit: Fit, halves: OutputError) -> np.ndarray:
     other = halves.fit(fit.unknowns, fit.theta, most=15, tolerance=1e-5)
     moved = fit.theta - other.theta
     seen = np.abs(moved) > SEEN * np.sqrt(np.diag(halves.covariance(other)))
-    return float(seen.any()) * np.outer(moved, moved)
+    return np.outer(moved, moved) if seen.any() else np.zeros((len(moved), len(moved)))
 
 
 def segment_length(problem: OutputError, u: Unknowns, theta: np.ndarray) -> float:

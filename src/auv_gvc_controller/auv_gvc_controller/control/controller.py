@@ -248,7 +248,7 @@ class VelocityController:
         return answer
 
     def _watch_between(self, now: Now) -> Answer | None:
-        """Let go between two odometries, however rare they are, until the wrench is zero."""
+        """Disengage between two odometries, however rare they are, until the wrench is zero."""
         if self._output.idle:
             return None
         ns, silent = self._guard.last or 0, '' if self._exact else self._silent(now)
@@ -287,7 +287,7 @@ class VelocityController:
         return f'no set-point for {age:.3g} s' if age > self._timeouts.setpoint else silent
 
     def _trip(self, ns: int, trouble: str, now: Now) -> Answer:
-        """Let go because of a watchdog: in real time the integrals do not outlive it."""
+        """Disengage because of a watchdog: in real time the integrals do not outlive it."""
         if self._timeouts is not None:
             self._law.reset()
         return self._disengage(ns, trouble, now)

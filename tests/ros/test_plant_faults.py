@@ -1,5 +1,6 @@
 """Faults on a real plant node: simulated inside it in lock-step, really withheld in real time."""
 
+import time
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from helpers.node_processes import Peer, graph, parameters
 from helpers.nodes_in_process import program
 from helpers.patience import patience
-from helpers.stalls import undisturbed
+from helpers.stalls import PAUSE, undisturbed
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_dynamics.files.errors import InputError
@@ -87,8 +88,10 @@ def test_real_time_withholds_odometry_and_ignores_wrenches() -> None:
     def goes_on(applied: np.ndarray) -> bool:
         return bool(applied[-10:].min() > heard_again)
 
-    true, stamps, applied = undisturbed(
-        lambda: in_real_time(heard_again, last), lambda found: held(found[2]) and goes_on(found[2])
+    true, stamps, applied, _ = undisturbed(
+        lambda: in_real_time(heard_again, last),
+        lambda found: held(found[2]) and goes_on(found[2]),
+        lambda found: found[3] > PAUSE,
     )
     assert true == list(range(last + 1))
     # lost from 30 to before 50; what was measured from 80 on was still under way at 100
@@ -100,8 +103,10 @@ def test_real_time_withholds_odometry_and_ignores_wrenches() -> None:
     assert goes_on(applied), 'and wrenches are heard again'
 
 
-def in_real_time(heard_again: int, last: int) -> tuple[list[int], list[int], np.ndarray]:
+def in_real_time(heard_again: int, last: int) -> tuple[list[int], list[int], np.ndarray, float]:
     """Steps of truth and odometry and the applied surge force, answering step k with k + 1 N.
+
+    And the longest time, s, in which no truth was heard: the plant stood still, or this process.
 
     The twist has the stamps of the odometry. Where a machine is given patience steps are longer:
     to hear 400 messages a second is work.
@@ -113,7 +118,7 @@ def in_real_time(heard_again: int, last: int) -> tuple[list[int], list[int], np.
         mute={'kind': 'wrench_loss', '_from': 120 * h, 'to': heard_again * h},
     )
     plant = parameters(vehicle='herman2018', step=h, duration=last * h, wrench_timeout=50 * h)
-    ready = 'expected_subscribers:=["odom=2","twist=1","wrench_applied=1","ground_truth/odom=1"]'
+    ready = 'expected_subscribers:=["odom=2","twist=1","wrench_applied=1","ground_truth/odom=2"]'
     with graph((PLANT, [*plant, '-p', ready, *given])) as (peer, _):
         peer.listen(*HEARD, topics.TWIST)
         say = peer.node.create_publisher(topics.WRENCH.type, topics.WRENCH.name, 10)
@@ -122,8 +127,10 @@ def in_real_time(heard_again: int, last: int) -> tuple[list[int], list[int], np.
             k = step_of(message, ns)
             say.publish(convert.wrench(k * ns, (k + 1.0, 0, 0, 0, 0, 0), Frames()))
 
-        qos = topics.every_step()
+        qos, came = topics.every_step(), list[float]()
         peer.node.create_subscription(topics.ODOM.type, topics.ODOM.name, answer, qos)
+        kind, name = topics.GROUND_TRUTH.type, topics.GROUND_TRUTH.name
+        peer.node.create_subscription(kind, name, lambda _: came.append(time.monotonic()), qos)
         truth = peer.heard[topics.GROUND_TRUTH.name]
         peer.until(lambda: truth and step_of(truth[-1], ns) == last, 'the end')
         peer.until(lambda: len(peer.heard[topics.WRENCH_APPLIED.name]) > last, 'every wrench')
@@ -131,7 +138,7 @@ def in_real_time(heard_again: int, last: int) -> tuple[list[int], list[int], np.
         steps = [step_of(m, ns) for m in peer.heard['odom']]
         peer.until(lambda: len(peer.heard['twist']) == len(steps), 'every twist')
         assert [step_of(m, ns) for m in peer.heard['twist']] == steps
-        return [step_of(m, ns) for m in truth], steps, applied
+        return [step_of(m, ns) for m in truth], steps, applied, float(np.diff(came).max())
 
 
 @pytest.mark.parametrize(

@@ -53,7 +53,7 @@ class Sea:
         self.tau: tuple | None = None
         self._wrench = self.peer.node.create_publisher(topics.WRENCH.type, 'wrench', 10)
         self.peer.node.create_subscription(
-            topics.ODOM.type, 'odom', self._on_odometry, topics.every_step()
+            topics.ODOM.type, 'odom', self._on_odometry, topics.newest_measurement(1)
         )
 
     def launch(self):
@@ -99,6 +99,17 @@ class Sea:
         self.until(lambda: self.odometry and age() < patience(0.5), 'odometry of now')
         assert age() > -0.05
 
+    def go_ahead(self) -> None:
+        """Wait until the push is seen; where the driver disarmed the vehicle, arm it again."""
+
+        def ahead() -> bool:
+            if '~/arm (' in self.facts().get('', ''):
+                self.peer.heard['/diagnostics'].clear()
+                self.peer.call(SetBool, 'bluerov2_driver/arm', SetBool.Request(data=True))
+            return self.surge > 0.2
+
+        self.until(ahead, 'the vehicle to go ahead')
+
     def more(self, count: int = 10) -> None:
         """Wait for so many more odometry messages."""
         enough = len(self.odometry) + count
@@ -134,14 +145,7 @@ def sea(running):
     """The vehicle under way; a test that needs it otherwise puts it back."""
     running.tau = PUSH
     running.catch_up()
-
-    def ahead() -> bool:
-        if '~/arm (' in running.facts().get('', ''):
-            running.peer.heard['/diagnostics'].clear()
-            running.peer.call(SetBool, 'bluerov2_driver/arm', SetBool.Request(data=True))
-        return running.surge > 0.2
-
-    running.until(ahead, 'the vehicle to go ahead')
+    running.go_ahead()
     running.peer.heard['/diagnostics'].clear()  # what they say from now on is of now
     return running
 
@@ -243,7 +247,7 @@ def test_a_signal_leaves_the_vehicle_disarmed_its_inputs_neutral(start, number) 
     sea = Sea(start)
     try:
         sea.tau = PUSH
-        sea.until(lambda: sea.surge > 0.2, 'the vehicle to go ahead')
+        sea.go_ahead()
         code, output = stop(sea.driver, number)
         assert code == 0
         assert AT_REST in stop(sea.vehicle)[1]

@@ -138,6 +138,15 @@ def test_a_narrow_page_does_not_scroll_sideways(report):
     report.page.emulate_media(color_scheme='light')
 
 
+def test_a_wide_table_scrolls_without_its_page(report):
+    table = report.page.locator('.tabled table').first
+    table.evaluate("(one) => { one.style.minWidth = '3000px'; }")
+    across = report.page.viewport_size['width']
+    assert report.page.evaluate('document.documentElement.scrollWidth') <= across
+    assert table.bounding_box()['width'] >= 3000
+    table.evaluate("(one) => { one.style.minWidth = ''; }")
+
+
 def test_paper_gets_the_still_figures(report):
     report.panel('error-linear')
     report.page.emulate_media(media='print')

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.metrics.statistics import Part, Statistics
-from auv_analysis.metrics.summary import TRANSIENT, band_of, has_settled
+from auv_analysis.metrics.summary import TRANSIENT, band_of, settling_times
 from auv_analysis.output.new_files import write_table
 from auv_analysis.runs.run import Run, RunInfo
 from auv_analysis.scenario.fault_words import Mark
@@ -90,13 +90,10 @@ def responses(run: Run) -> list[FaultResponse]:
         statistics.add(block.t, np.concatenate([block.nu_d - block.nu, block.tau], axis=1))
         peak = np.maximum(peak, np.abs(block.nu_d).max(axis=0))
     band = band_of(peak)
-    recoveries = [_Recovery(mark, run) for mark in run.faults]
-    for block in run.blocks():
-        error = np.abs(block.nu_d - block.nu)
-        for one in recoveries:
-            one.add(block.t, error, band)
-    found = []
-    for mark, recovery in zip(run.faults, recoveries, strict=True):
+    last, found = run.start + run.duration, []
+    for mark in run.faults:
+        recovery = recovery_times(mark, run, band)
+        until = min(next_change(mark, run), last) if mark.end <= last + tiny else None
         parts = [statistics.between(a - tiny, b - tiny) for a, b in windows[mark]]
         for i, dof in enumerate(DOFS):
             found.append(
@@ -108,8 +105,8 @@ def responses(run: Run) -> list[FaultResponse]:
                     _of(parts, 'rms', i),
                     _of(parts, 'peak', i),
                     float(band[i]),
-                    recovery.time(i),
-                    recovery.until,
+                    recovery[i],
+                    until,
                     _of(parts, 'rms', 6 + i),
                 )
             )
@@ -121,41 +118,19 @@ def _of(parts: Sequence[Part | None], name: str, column: int) -> tuple[Any, ...]
     return tuple(None if part is None else float(getattr(part, name)[column]) for part in parts)
 
 
-class _Recovery:
-    """Settling time of the errors after the end of one fault, block by block."""
-
-    def __init__(self, mark: Mark, run: RunInfo):
-        self._mark, self._run = mark, run
-        self._until = next_change(mark, run)
-        self._outside = np.full(6, -math.inf)  # time of the last sample outside the band
-        self._seen, self._left = 0, np.full(6, -1)  # samples of recovery, and the last one outside
-
-    def add(self, t: np.ndarray, error: np.ndarray, band: np.ndarray) -> None:
-        """Take in consecutive samples of abs(nu_d - nu)."""
-        tiny = 1e-6 * self._run.step
-        behind = np.flatnonzero((t >= self._mark.end - tiny) & (t < self._until - tiny))
-        if len(behind):
-            for i in range(6):
-                outside = np.flatnonzero(error[behind, i] > band[i])
-                if len(outside):
-                    self._left[i] = self._seen + outside[-1]
-                    self._outside[i] = t[behind[outside[-1]]]
-            self._seen += len(behind)
-
-    @property
-    def until(self) -> float | None:
-        """When the time that is looked at ends, s; None where the fault has no end."""
-        last = self._run.start + self._run.duration
-        return min(self._until, last) if self._mark.end <= last + 1e-6 * self._run.step else None
-
-    def time(self, i: int) -> float | None:
-        """Seconds until one of them has settled; None: it has not."""
-        unseen = self._mark.end < self._run.start
-        if unseen or not self._seen or not has_settled(self._left[i], self._seen):
-            return None
-        if self._left[i] < 0:
-            return 0.0
-        return round(float(self._outside[i] + self._run.step - self._mark.end), 9)
+def recovery_times(mark: Mark, run: Run, band: np.ndarray) -> list[float | None]:
+    """Seconds from the end of a fault until each error has settled in its band; None: never."""
+    tiny, until = 1e-6 * run.step, next_change(mark, run)
+    errors = []
+    for block in run.blocks():
+        behind = (block.t >= mark.end - tiny) & (block.t < until - tiny)
+        errors.append((block.t[behind], (block.nu_d - block.nu)[behind]))
+    t = np.concatenate([times for times, _ in errors])
+    if mark.end < run.start or not len(t):
+        return [None] * 6
+    settled, _ = settling_times(errors, len(t), band)
+    since = [None if time is None else round(time - mark.end, 9) for time in settled]
+    return [0.0 if time == t[0] else wait for time, wait in zip(settled, since, strict=True)]
 
 
 def write_responses(folder: Path, found: Mapping[str, Sequence[FaultResponse]]) -> Path:

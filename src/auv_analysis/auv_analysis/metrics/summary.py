@@ -145,7 +145,7 @@ def settling_time(t: np.ndarray, error: np.ndarray, nu_d: np.ndarray) -> list[fl
     error, nu_d : (n, 6) m/s, rad/s
 
     """
-    return _settling([(t, error)], len(t), band_of(np.abs(nu_d).max(axis=0)))[0]
+    return settling_times([(t, error)], len(t), band_of(np.abs(nu_d).max(axis=0)))[0]
 
 
 def dwell(samples: int) -> int:
@@ -165,10 +165,18 @@ def has_settled(outside: np.ndarray, samples: int) -> np.ndarray:
     return samples - 2 - outside >= dwell(samples)
 
 
-def _settling(
+def settling_times(
     blocks: Iterable[tuple[np.ndarray, np.ndarray]], samples: int, band: np.ndarray
 ) -> tuple[list[float | None], list[float]]:
-    """Settling times and largest errors of the final dwell time, of consecutive blocks."""
+    """Settling times and largest errors of the final dwell time, of consecutive blocks.
+
+    Parameters
+    ----------
+    blocks : times (n,) and errors (n, 6), m/s and rad/s
+    samples : of all blocks
+    band : (6,) of a settled error
+
+    """
     entered, outside, residual = np.full(6, np.nan), np.full(6, -1), np.zeros(6)
     seen, last = 0, samples - 1 - dwell(samples)
     for t, error in blocks:
@@ -209,7 +217,7 @@ def _errors(run: Run, whole: Moments, after: Moments, known: np.ndarray) -> dict
     band = band_of(whole.peaks[signals.SETPOINT])
     errors = ((block.t, block.nu_d - block.nu) for block in run.blocks())
     blocks = ((np.round(t - run.start, 9) if run.start else t, error) for t, error in errors)
-    times, residual = _settling(blocks, run.samples, band)
+    times, residual = settling_times(blocks, run.samples, band)
     late = _peak(after, signals.ERROR)
     return {
         'velocity_error': {

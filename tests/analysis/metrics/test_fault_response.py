@@ -12,8 +12,8 @@ from auv_analysis.metrics.fault_response import (
     fault_rows,
     responses,
     windows_of,
-    write_responses,
 )
+from auv_analysis.output.new_files import write_table
 from auv_analysis.report.document import write_numbers
 from auv_analysis.report.faults import fault_overview, fault_tables
 from auv_analysis.runs.run import Run
@@ -158,7 +158,7 @@ def test_every_number_of_the_tables_is_in_the_file(made, tmp_path):
     import pyarrow.parquet as parquet
 
     found = {'gvc': responses(made)}
-    write_responses(tmp_path, found)
+    write_table(tmp_path / FILE, fault_rows(found))
     tables = list(fault_tables(found))
     write_numbers(tmp_path / 'numbers.parquet', tables)
     held = parquet.read_table(tmp_path / FILE)

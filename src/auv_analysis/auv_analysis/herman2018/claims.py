@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pyarrow import parquet
 
 from auv_analysis.herman2018 import criteria, paper
 from auv_analysis.herman2018.evidence import (
@@ -19,7 +18,7 @@ from auv_analysis.herman2018.evidence import (
     Verdict,
 )
 from auv_analysis.herman2018.paper import CASES, is_plain, paper_run
-from auv_analysis.output.arrow import pa
+from auv_analysis.output.new_files import write_table
 from auv_analysis.output.text import MISSING, fixed, join
 from auv_analysis.report.digest import TINY, RunDigest, digests
 from auv_analysis.report.document import Block, Section, Sentence, prose
@@ -357,12 +356,7 @@ def _counts(claims: Sequence[Claim]) -> Iterator[str]:
 
 def write_claims(folder: Path, claims: Sequence[Claim]) -> Path:
     """Write `claims.parquet`, long: `of` says whether a number is 'ours' or the 'paper''s."""
-    rows = [row for claim in claims for row in _numbers(claim)]
-    types = {'number': pa.int64(), 'value': pa.float64()}
-    names = (*FACTS, 'of', 'name', 'value', 'unit')
-    schema = pa.schema([(name, types.get(name, pa.string())) for name in names])
-    parquet.write_table(pa.Table.from_pylist(rows, schema=schema), folder / FILE)
-    return folder / FILE
+    return write_table(folder / FILE, [row for claim in claims for row in _numbers(claim)])
 
 
 def _numbers(claim: Claim) -> Iterator[dict[str, Any]]:

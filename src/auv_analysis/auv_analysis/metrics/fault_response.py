@@ -3,14 +3,12 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from auv_analysis.metrics.statistics import Part, Statistics
 from auv_analysis.metrics.summary import TRANSIENT, band_of, settling_times
-from auv_analysis.output.new_files import write_table
 from auv_analysis.runs.run import Run, RunInfo
 from auv_analysis.scenario.fault_words import Mark
 from auv_dynamics.vehicle import DOFS
@@ -133,13 +131,8 @@ def recovery_times(mark: Mark, run: Run, band: np.ndarray) -> list[float | None]
     return [0.0 if time == t[0] else wait for time, wait in zip(settled, since, strict=True)]
 
 
-def write_responses(folder: Path, found: Mapping[str, Sequence[FaultResponse]]) -> Path:
-    """Write `faults.parquet`, a row per fault, controller and degree of freedom."""
-    return write_table(folder / FILE, fault_rows(found))
-
-
 def fault_rows(found: Mapping[str, Sequence[FaultResponse]]) -> list[dict[str, Any]]:
-    """Rows of `faults.parquet`."""
+    """Rows of `faults.parquet`: one per controller, fault and degree of freedom."""
     return [_row(name, response) for name, several in found.items() for response in several]
 
 

@@ -17,10 +17,10 @@ from auv_analysis.metrics.fault_response import (
     FaultResponse,
     fault_rows,
     responses,
-    write_responses,
 )
 from auv_analysis.metrics.quantities import SIGNALS
 from auv_analysis.metrics.summary import BAND_TEXT, TRANSIENT
+from auv_analysis.output.new_files import write_table
 from auv_analysis.output.text import Maths, capital, join, number
 from auv_analysis.report import plots
 from auv_analysis.report.digest import RunDigest, digests
@@ -58,7 +58,7 @@ def fault_part(out: Path, runs: Mapping[str, Run]) -> tuple[Section, list[Senten
     found: dict[str, list[FaultResponse]] = {name: responses(run) for name, run in runs.items()}
     blocks: list[Block] = [NO_ERROR]
     if all(found.values()):
-        write_responses(out, found)
+        write_table(out / FILE, fault_rows(found))
         drawn = {'faults': partial(fault_figure, digests(runs))}
         blocks = [ABOUT, *save_figures(out / 'figures', drawn).values(), *fault_tables(found)]
     else:

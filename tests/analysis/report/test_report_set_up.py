@@ -14,7 +14,7 @@ from helpers.made_runs import made
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.herman2018.claims import judge_runs
-from auv_analysis.herman2018.paper import paper_figure
+from auv_analysis.herman2018.paper import paper_figures
 from auv_analysis.report import plots, run_plots
 from auv_analysis.report.digest import digest, digests
 from auv_analysis.report.run_report import write_report
@@ -249,7 +249,7 @@ def test_a_plant_with_devices_is_not_the_papers(case1):
     ):
         changed = {name: replace(run, **change) for name, run in runs.items()}
         assert judge_runs(changed, summaries) == []
-        assert paper_figure(changed['gvc'], 'errors') is None
+        assert paper_figures(changed['gvc']) == []
 
 
 def test_every_reason_against_a_certificate_is_given_once(rough):

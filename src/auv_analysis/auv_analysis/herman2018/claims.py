@@ -12,6 +12,7 @@ from auv_analysis.herman2018.evidence import (
     DECIDED,
     Claim,
     Evidence,
+    Judgement,
     Quotes,
     Row,
     Value,
@@ -270,14 +271,11 @@ def judged(cases: Mapping[str, Evidence]) -> list[Claim]:
 def _claim(index: int, row: Row, cases: Mapping[str, Evidence]) -> Claim:
     case = next(name for name in (*cases, *row.cases) if name in row.cases)
     verdict, reason = _obstacle(row, case, cases.get(case))
-    texts = index, row.claim, row.paper
-    if verdict:
-        return Claim(*texts, MISSING, verdict, row.criterion, reason, case, printed=row.printed)
     quote = Quotes()
-    found = row.judge(cases[case], quote)
+    found = Judgement(MISSING, verdict) if verdict else row.judge(cases[case], quote)
     return Claim(
-        *texts, found.ours, found.verdict, row.criterion, row.remark, case, found.window,
-        quote.values, row.printed,
+        index, row.claim, row.paper, found.ours, found.verdict, row.criterion,
+        reason or row.remark, case, found.window, quote.values, row.printed,
     )  # fmt: skip
 
 

@@ -62,14 +62,11 @@ def paper_run(runs: Mapping[str, AnyFacts], law: str) -> AnyFacts | None:
     return None
 
 
-def paper_figure(run: RunInfo, kind: str) -> str | None:
-    """Number of the paper's figure that a run's figure of this kind reproduces, or None."""
-    number = FIGURES.get(run.scenario, {}).get((kind, run.law))
-    return number if number and paper_run({run.controller: run}, run.law) else None
-
-
 def paper_figures(run: RunInfo) -> list[str]:
     """Figures of a run that correspond to a figure of the paper, in words."""
+    numbers = FIGURES.get(run.scenario, {})
+    if not numbers or paper_run({run.controller: run}, run.law) is None:
+        return []
     kinds = ('errors', 'lumped_error', 'inputs', 'delta_xi', 'delta_pi')
-    found = {kind: paper_figure(run, kind) for kind in kinds}
+    found = {kind: numbers.get((kind, run.law)) for kind in kinds}
     return [f'{kind} is the paper’s figure {number}' for kind, number in found.items() if number]

@@ -354,7 +354,7 @@ def test_numbers_as_text():
         '12', '0.8', '−0.025', '30\u202f000', '0',
     ]  # fmt: skip
     assert [plain(x) for x in (1.5e9, -1e-7)] == ['1.5·10⁹', '−1·10⁻⁷']
-    assert [fixed(x, 2) for x in (-4.016, None)] == ['−4.02', '–']
+    assert [fixed(x, 2) for x in (-4.016, -0.004, None)] == ['−4.02', '0.00', '–']
     assert [fixed(x, 1) for x in (12345.67, np.nan)] == ['12\u202f345.7', '–']
     assert [capital(text) for text in ('', 'a', 'aB c', 'Δξ')] == ['', 'A', 'AB c', 'Δξ']
     assert [join(words) for words in ([], ['a'], ['a', 'b'], ['a', 'b', 'c'])] == [

@@ -77,7 +77,7 @@ def short(value: float) -> str:
 
 def percent(value: float) -> str:
     """Text of a change in % with its sign."""
-    return f'{round(value, 1) + 0.0:+.1f}'.replace('-', '−')
+    return f'{value:+z.1f}'.replace('-', '−')
 
 
 Verdict = Literal['reproduced', 'partly', 'not reproduced', 'other case', 'not evaluated']

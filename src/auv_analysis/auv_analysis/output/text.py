@@ -52,7 +52,7 @@ def fixed(value: float | None, decimals: int) -> str:
     """Text of a number with that many decimals; an en dash for None and NaN."""
     if value is None or math.isnan(value):
         return MISSING
-    return f'{value:,.{decimals}f}'.replace(',', '\u202f').replace('-', '−')
+    return f'{value:z,.{decimals}f}'.replace(',', '\u202f').replace('-', '−')
 
 
 def typeset(text: str) -> str:

@@ -487,7 +487,7 @@ def _text(value: float, grid: HeatMap) -> str:
     if value == 0.0:
         return '0'
     if grid.decimals is not None:
-        return fixed(round(value, grid.decimals) + 0.0, grid.decimals)  # never a minus zero
+        return fixed(value, grid.decimals)
     return typeset(number(value, 2))
 
 

@@ -237,7 +237,7 @@ def fixed(value: float | None, digits: int = 4) -> str:
     """Number with so many decimals; those that are very large in powers of ten."""
     if value is None:
         return MISSING
-    return _unsigned_zero(f'{value:.{digits}f}') if abs(value) < 1000 else f'{value:.1e}'
+    return f'{value:z.{digits}f}' if abs(value) < 1000 else f'{value:.1e}'
 
 
 def short(value: float | None) -> str:
@@ -248,12 +248,7 @@ def short(value: float | None) -> str:
     if size >= 1e6:
         return f'{value:.1e}'
     digits = 0 if size >= 1000 else 1 if size >= 100 else 2 if size >= 10 else 3
-    return _unsigned_zero(f'{value:.{digits}f}')
-
-
-def _unsigned_zero(text: str) -> str:
-    """Text of a number without the sign of a zero."""
-    return text.removeprefix('-') if not text.strip('-0.') else text
+    return f'{value:z.{digits}f}'
 
 
 def seconds(value: float | None) -> str:

@@ -7,7 +7,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.metrics.certificate import certificate, derivative, integral_of, sampled_integral
+from auv_analysis.metrics.certificate import (
+    Certificate,
+    as_figures,
+    certificate,
+    derivative,
+    integral_of,
+    sampled_integral,
+)
 from auv_analysis.metrics.lyapunov import lyapunov
 from auv_dynamics import load_vehicle
 from auv_gvc_controller.laws.law import make_gains
@@ -76,6 +83,21 @@ def test_a_single_sample_has_no_rates():
     one = certificate(T[:1], NU[:1], NU_D[:1], Z[:1], F[:1], F_HAT[:1], 'cl', gains, MODEL)
     assert np.isnan([one.L_dot[0], one.drift[0], one.rho[0]]).all()
     assert np.isfinite([one.L[0], one.dissipation[0]]).all()
+
+
+def test_the_bound_is_judged_by_the_largest_rate_of_the_whole_run():
+    """One in a million of 4 W: of six samples, 2 and 8 in a million above (28), one is beyond."""
+    nothing = np.zeros((2, 6))
+
+    def block(power: float, excess: float) -> Certificate:
+        lost = np.full(2, power)
+        L_dot = np.array([0.0, excess]) - lost
+        return Certificate(T[:2], *3 * [nothing], lost, L_dot, lost, 0.0 * lost, 0.0 * lost)
+
+    figures = as_figures(iter([block(0.0, 0.0), block(1.0, 2e-6), block(4.0, 8e-6)]), 0.0)
+    assert figures['share_bound_28'] == 5 / 6
+    assert figures['share_condition_27'] == 1.0, 'also at rest'
+    assert figures['identity_residual'] == pytest.approx(2e-6)
 
 
 def test_sampled_integral():

@@ -20,6 +20,7 @@ from auv_analysis.runs.run import Run
 from auv_analysis.scenario.fault_words import Mark, label, marks_of
 from auv_analysis.scenario.scenario import load_scenario
 from auv_dynamics import load_vehicle
+from auv_dynamics.vehicle import DOFS
 
 H = 0.01
 LOST = Mark(1, 'thruster', 'thruster T3 lost', 10.0, 14.0)
@@ -104,6 +105,30 @@ def test_errors_recovery_and_effort(made):
     stays = found[2, 'sway']
     assert (stays.rms[2], stays.recovery, stays.until) == (None, None, None)
     assert stays.rms[1] == pytest.approx(0.3)
+
+
+def test_every_number_is_that_of_its_axis_and_its_time(made):
+    error, tau = np.random.default_rng(3).normal(size=(2, len(made.t), 6)) * np.arange(1.0, 7.0)
+    for one in responses(replace(made, nu=made.nu_d - error, tau=tau)):
+        i = DOFS.index(one.dof)
+        for k, (begin, end) in enumerate(one.windows):
+            inside = (made.t >= begin - 1e-6) & (made.t < end - 1e-6)
+            found = one.rms[k], one.peak[k], one.effort[k]
+            if not inside.any():
+                assert (one.mark, k, found) == (LATE, 2, (None, None, None))
+                continue
+            e, u = error[inside, i], tau[inside, i]
+            expected = np.sqrt(np.mean(e**2)), np.abs(e).max(), np.sqrt(np.mean(u**2))
+            assert found == pytest.approx(expected, rel=1e-9)
+
+
+def test_recovery_counts_from_the_end_of_the_fault_not_from_the_next_sample(made):
+    nu = made.nu_d - 0.001
+    nu[:1451, 1] -= 0.1  # up to 14.5 s
+    ended = LOST._replace(end=14.003)
+    found = {one.dof: one for one in responses(replace(made, nu=nu, faults=(ended,)))}
+    assert found['sway'].recovery == 0.507
+    assert found['heave'].recovery == 0.0
 
 
 def test_an_error_that_is_outside_at_the_end_is_not_recovered(made):

@@ -11,13 +11,12 @@ from auv_analysis.runs.run import Windows
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Statistics of consecutive samples of signals, (k,) each but for count and times.
+    """Statistics of consecutive samples of signals, (k,) each but for the count.
 
     Attributes
     ----------
     count : number of samples
-    start, end : times of the first and the last, s
-    first, last : values there
+    first, last : values at the ends
     sums, squares : over the samples
     low, high : extremes
     peak, at : largest magnitude and the time where it is first reached, s
@@ -26,8 +25,6 @@ class Part:
     """
 
     count: int
-    start: float
-    end: float
     first: np.ndarray
     last: np.ndarray
     sums: np.ndarray
@@ -55,8 +52,8 @@ class Part:
 
     def of(self, columns: slice) -> 'Part':
         """The same of some of the signals."""
-        count, start, end, *values = (getattr(self, entry.name) for entry in fields(self))
-        return Part(count, start, end, *(value[columns] for value in values))
+        count, *values = (getattr(self, entry.name) for entry in fields(self))
+        return Part(count, *(value[columns] for value in values))
 
 
 def part_of(t: np.ndarray, values: np.ndarray) -> Part:
@@ -65,8 +62,6 @@ def part_of(t: np.ndarray, values: np.ndarray) -> Part:
     where = size.argmax(axis=0)
     return Part(
         count=len(t),
-        start=float(t[0]),
-        end=float(t[-1]),
         first=values[0].copy(),  # a view would keep the block
         last=values[-1].copy(),
         sums=values.sum(axis=0),
@@ -83,8 +78,6 @@ def followed(a: Part, b: Part) -> Part:
     """Part of the samples of one and of those that come next."""
     return Part(
         count=a.count + b.count,
-        start=a.start,
-        end=b.end,
         first=a.first,
         last=b.last,
         sums=a.sums + b.sums,

@@ -343,11 +343,10 @@ def logarithmic(axes: Axes, *directions: str) -> None:
         axis.set_minor_locator(NullLocator())
 
 
-def symmetric(axes: Axes, linear: float) -> float:
+def symmetric(axes: Axes, linear: float) -> None:
     """Axis that is linear around zero and logarithmic beyond a power of ten next to `linear`.
 
-    Dotted lines mark where the one ends and the other begins; returns that power of ten.
-
+    Dotted lines mark where the one ends and the other begins.
     """
     first = round(np.log10(linear))
     low, high = axes.dataLim.intervaly
@@ -363,7 +362,6 @@ def symmetric(axes: Axes, linear: float) -> float:
     ]
     axes.set_yticks(ticks, names)
     axes.yaxis.set_minor_locator(NullLocator())
-    return 10.0**first
 
 
 def letter(axes: Axes, index: int, text: str = '') -> None:

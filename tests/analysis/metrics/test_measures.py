@@ -10,7 +10,6 @@ from auv_analysis.metrics.measures import (
     BY_NAME,
     FAMILIES,
     MEASURES,
-    described,
     flat,
 )
 from auv_analysis.metrics.quantities import quantity
@@ -30,7 +29,8 @@ def test_columns_are_named_like_those_of_a_sweep(summary) -> None:
     assert columns['decomposition.Upsilon.sway.yaw'] == summary['decomposition']['Upsilon'][1][5]
     assert columns['kinetic_energy.mean'] == summary['kinetic_energy']['mean']
     found = quantity('kinetic_energy.mean')
-    assert described('kinetic_energy.mean') == (found.label, found.unit, found.meaning)
+    total = BY_NAME['kinetic_energy.mean']
+    assert (total.label, total.unit, total.meaning) == (found.label, found.unit, found.meaning)
     assert columns['kinetic_energy.window.to'] == summary['kinetic_energy']['window'][1]
     assert columns['coupling.structural_zeros.delta_xi'] == 'pitch; yaw'
     term = summary['coupling_terms']['delta_xi'][0]
@@ -84,10 +84,10 @@ def test_measures_sum_up_their_columns(values) -> None:
 
 def test_every_column_says_its_unit() -> None:
     for name in (*BY_NAME, *(f'{family}.{dof}' for family in FAMILIES for dof in DOFS)):
-        label, unit, meaning = described(name)
-        assert all((label, unit, meaning)), name
-    assert described('effort.rms.surge')[1] == 'N'
-    assert described('effort.rms.roll')[1] == 'N m'
+        what = BY_NAME.get(name) or quantity(name)
+        assert all((what.label, what.unit, what.meaning)), name
+    assert quantity('effort.rms.surge').unit == 'N'
+    assert quantity('effort.rms.roll').unit == 'N m'
     assert quantity('overall.effort.rms.linear').unit == 'N'
     assert quantity('overall.effort.rms.angular').unit == 'N m'
     assert len({measure.label for measure in MEASURES}) == len(MEASURES)

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from auv_analysis.metrics.quantities import HALVES, METRICS, quantity
+from auv_analysis.metrics.quantities import HALVES, METRICS
 from auv_analysis.metrics.summary import SETTLED
 from auv_dynamics.vehicle import DOFS
 
@@ -80,15 +80,6 @@ MEASURES = (
     *_halves('effort.max', 'largest'),
 )
 BY_NAME = {measure.name: measure for measure in MEASURES}
-
-
-def described(column: str) -> tuple[str, str, str]:
-    """Label, unit and meaning of a measure or of a column of a family; ('', '', '') of others."""
-    if column in BY_NAME:
-        measure = BY_NAME[column]
-        return measure.label, measure.unit, measure.meaning
-    found = quantity(column)
-    return found.label, found.unit, found.meaning
 
 
 def flat(summary: Mapping[str, Any]) -> dict[str, Any]:

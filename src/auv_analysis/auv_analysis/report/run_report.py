@@ -142,15 +142,14 @@ class SectionInputs:
 
     def sections(self) -> list[Section]:
         """All sections in their order."""
-        found = [
+        return [
             Section('experiment', 'Experiment', [*self._experiment()]),
             Section('gains', 'Step 1: the gains in the body frame', [*self._gains()]),
             Section('tracking', 'Steps 2 and 3: errors, estimates and inputs', [*self._tracking()]),
             Section('energy', 'Step 4: kinetic energy', [*self._energy()]),
             Section('couplings', 'Step 5: couplings', [*self._couplings()]),
+            Section('basis', 'What this rests on', [*self._basis()]),
         ]
-        found.append(Section('basis', 'What this rests on', [*self._basis()]))
-        return found
 
     def _drawn(self, part: str) -> list[FigureRecord]:
         return [figure for figure in self.figures if figure.name.startswith(FIGURES[part])]

@@ -8,7 +8,8 @@ from itertools import product
 
 import numpy as np
 
-from auv_analysis.metrics.measures import BY_NAME, FAMILIES, MEASURES, Measure, described
+from auv_analysis.metrics.measures import BY_NAME, FAMILIES, MEASURES, Measure
+from auv_analysis.metrics.quantities import quantity
 from auv_analysis.output.folder import ROLLOUTS, listed_in, sha256_of
 from auv_analysis.output.new_files import known
 from auv_analysis.output.progress import each
@@ -45,10 +46,10 @@ COUNT = 10  # best rows of each controller
 def _spreads(analysis: 'Analysis', columns: Mapping[str, np.ndarray]) -> None:
     """Rows of `quantiles.parquet`: controller, figure, its unit and meaning, its quantiles."""
     for name, values in columns.items():
-        label, unit, meaning = described(name)
-        said = {'figure': name, 'label': label, 'unit': unit, 'meaning': meaning}
+        what = BY_NAME.get(name) or quantity(name)
+        said = {'figure': name, 'label': what.label, 'unit': what.unit, 'meaning': what.meaning}
         analysis.spreads[name] = [
-            {'controller': controller} | said | spread(values[rows], unit)
+            {'controller': controller} | said | spread(values[rows], what.unit)
             for controller, rows in analysis.sweep.finished.items()
         ]
 

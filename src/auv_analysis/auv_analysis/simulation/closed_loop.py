@@ -185,7 +185,7 @@ class Tables(NamedTuple):
     reference : (T, s, 12) nu_d, nu_d_dot; with the wrench held only the first stage counts
     F : (T, s, 6) external disturbance, N, N m
     current : (T, s, 6) v_c, v_c_dot in NED; (T, 0, 6) in still water
-    noise : (T, 11) of the sensors; (0, 11): they are perfect
+    noise : (T, 11) of the sensors; (0, 0): they are perfect
     faults : (T, 14 + 2 n), see `plant.faults`; (0, 0): there are none
 
     """

@@ -13,15 +13,9 @@ from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.batch import Batch, Known, run_batch
 from auv_analysis.simulation.closed_loop import Tables
 from auv_analysis.simulation.reduction import COLUMNS, columns
-from auv_analysis.simulation.simulate import (
-    check_hold,
-    reference,
-    tables,
-)
+from auv_analysis.simulation.simulate import check_hold, next_rows, reference, tables
 from auv_analysis.simulation.variants import Variants, in_columns, merged, packed_variants
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.plant.devices import SensorNoise
-from auv_dynamics.plant.faults import FaultRows
 from auv_gvc_controller.control.setpoint import Setpoint
 
 BLOCK = 256  # steps whose set-points are looked at together for their peak
@@ -248,14 +242,10 @@ def _own(variants: Variants, vehicles: range, hold: Hold) -> Known:
             references(t),
             np.stack([acting[s.texts[1]][0] for s in used]),
             np.stack([acting[s.texts[1]][1] for s in used]),
-            *(np.stack([_rows(of, len(t)) for of in each]) for each in (noises, faults)),
+            *(np.stack([next_rows(one, len(t)) for one in drawn]) for drawn in (noises, faults)),
         )
 
     return known
-
-
-def _rows(of: SensorNoise | FaultRows | None, count: int) -> np.ndarray:
-    return np.zeros((0, 0)) if of is None else of.rows(count)
 
 
 def _once(scenarios: Sequence[Scenario], which: int, function: Any) -> dict[str, Any]:

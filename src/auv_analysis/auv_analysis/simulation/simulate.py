@@ -25,7 +25,7 @@ from auv_dynamics.kernel.compile import INSTALLED, JITTED, cache_folder, plain
 from auv_dynamics.kernel.integrator import TABLEAUS, stage_times
 from auv_dynamics.kernel.lanes import with_batch_axis
 from auv_dynamics.plant.actuators import memory
-from auv_dynamics.plant.devices import WIDTH, SensorNoise, history_shape
+from auv_dynamics.plant.devices import SensorNoise, history_shape
 from auv_dynamics.plant.faults import FaultRows
 from auv_dynamics.plant.plant import SIZE, Plant, initial_state, unwrapped_eta
 from auv_gvc_controller.control.sampled_law import SampledLaw, anti_windup, is_compiled
@@ -118,10 +118,13 @@ def tables(
     hold: Hold = 'continuous',
 ) -> Tables:
     """Set-points, disturbance, current and the next rows of noise and faults at t (T, s)."""
-    rows = np.zeros((0, WIDTH)) if noise is None else noise.rows(len(t))
-    failing = np.zeros((0, 0)) if faults is None else faults.rows(len(t))
-    known = scenario.uncertainty.tables(t)
-    return Tables(reference(scenario.setpoint, t, hold), *known, rows, failing)
+    drawn = (next_rows(one, len(t)) for one in (noise, faults))
+    return Tables(reference(scenario.setpoint, t, hold), *scenario.uncertainty.tables(t), *drawn)
+
+
+def next_rows(drawn: SensorNoise | FaultRows | None, count: int) -> np.ndarray:
+    """The next rows of noise or of faults, (0, 0) where there are none of them."""
+    return np.zeros((0, 0)) if drawn is None else drawn.rows(count)
 
 
 def reference(setpoint: Setpoint, t: np.ndarray, hold: Hold) -> np.ndarray:

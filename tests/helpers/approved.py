@@ -109,7 +109,8 @@ def _parts(path: Path) -> dict[str, list[str]]:
 def _check_line(one: CheckResult) -> Iterator[str]:
     """What a check of a driver says, once it has its name."""
     if one.id:
-        numbers = ', '.join(f'{name} {value:.4g}' for name, value in one.measured.items())
+        known = {k: x for k, x in one.document()['numbers'].items() if x is not None}
+        numbers = ', '.join(f'{name} {value:.4g}' for name, value in known.items())
         yield ' | '.join((one.id, one.verdict, one.expected, one.found, one.advice, numbers))
 
 

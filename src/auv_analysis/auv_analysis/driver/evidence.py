@@ -1,8 +1,7 @@
 """Evidence on a driver: who was there, what was heard and sent; and the finding of a check."""
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -21,6 +20,7 @@ from auv_analysis.metrics.pose_twist import (
     compare_rates,
     fit_readings,
 )
+from auv_analysis.output.new_files import known
 from auv_dynamics.ros.interface import NANOSECONDS, Frames
 from auv_gvc_controller.control.settings import ControllerSettings
 
@@ -228,24 +228,8 @@ class CheckResult:
     id: str = ''
 
     def document(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        return {
-            'id': self.id,
-            'verdict': self.verdict,
-            'expected': self.expected,
-            'found': self.found,
-            'advice': self.advice,
-            'numbers': dict.fromkeys(self.numbers) | self.measured,
-        }
-
-    @property
-    def measured(self) -> dict[str, float]:
-        """The numbers that are finite."""
-        return {
-            name: value
-            for name, value in self.numbers.items()
-            if value is not None and math.isfinite(value)
-        }
+        """Ready for JSON: null for a number that is not finite."""
+        return {'id': self.id, 'verdict': self.verdict, **known(asdict(self))}
 
 
 def judged(

@@ -259,15 +259,16 @@ def test_a_delay_is_the_median_of_the_axes_and_as_unsure_as_they_are_apart() -> 
     undecided = answer('heave', 0.9, 0.0, sign=0)
     bounded = answer('roll', 0.24, 0.01, pulse=0.5)  # as late as half of its pulse
     delay = command_to_response_delay(Made(answered=[*some, undecided, bounded]))
-    assert delay.axes == {'surge': (0.1, 0.01), 'sway': (0.14, 0.03), 'yaw': (0.42, 0.02)}
-    assert delay.seconds == 0.14
-    assert delay.uncertainty == pytest.approx(1.48 * 0.04)
+    axes = {dof: tuple(axis.values()) for dof, axis in delay['axes'].items()}
+    assert axes == {'surge': (0.1, 0.01), 'sway': (0.14, 0.03), 'yaw': (0.42, 0.02)}
+    assert (delay['seconds'], delay['option']) == (0.14, '--delay 0.14')
+    assert delay['uncertainty'] == pytest.approx(1.48 * 0.04)
     one = command_to_response_delay(Made(answered=[answer('yaw', 0.2, 0.03, sign=-1), undecided]))
-    assert (one.seconds, one.uncertainty) == (0.2, pytest.approx(0.03))
+    assert (one['seconds'], one['uncertainty']) == (0.2, pytest.approx(0.03))
     errors = [answer('surge', 0.2, 0.03), answer('yaw', 0.2, 0.04)]
     two = command_to_response_delay(Made(answered=errors))
-    assert two.uncertainty == pytest.approx(0.05 / np.sqrt(2.0))
-    assert command_to_response_delay(Made(answered=[bounded])).seconds == 0.24
+    assert two['uncertainty'] == pytest.approx(0.05 / np.sqrt(2.0))
+    assert command_to_response_delay(Made(answered=[bounded]))['seconds'] == 0.24
     assert command_to_response_delay(Made(answered=[undecided])) is None
 
 

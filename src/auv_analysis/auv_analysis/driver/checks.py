@@ -314,7 +314,6 @@ def refusal(findings: Sequence[CheckResult]) -> str:
 def document_of(evidence: DriverRecord, findings: Sequence[CheckResult]) -> dict[str, Any]:
     """All that was found, ready for JSON."""
     graph, log = evidence.graph, evidence.log
-    delay = response.command_to_response_delay(evidence)
     return {
         'place': graph.place,
         'topics': {ODOM: graph.odom, WRENCH: graph.wrench},
@@ -324,7 +323,7 @@ def document_of(evidence: DriverRecord, findings: Sequence[CheckResult]) -> dict
         'counts': counts(findings),
         'checks': [finding.document() for finding in findings],
         'trials': [trial.document() for trial in evidence.answered],
-        'command_to_response_delay': delay and delay.document(),
+        'command_to_response_delay': response.command_to_response_delay(evidence),
     }
 
 

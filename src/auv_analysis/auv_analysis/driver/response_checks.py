@@ -1,7 +1,6 @@
 """Response checks: sign, axis, size and delay of the response to a wrench, and the watchdog."""
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -104,52 +103,30 @@ def _elsewhere(measured: MeasuredTrial) -> str:
     return DOFS[largest] if more[largest] > ELSEWHERE * measured.trial.speed else ''
 
 
-class Delay(NamedTuple):
-    """Delay from a wrench to the odometry that shows the answer.
+def command_to_response_delay(evidence: DriverRecord) -> dict[str, Any] | None:
+    """Delay from a wrench to the odometry that shows the answer; None where no sign is told.
 
-    Attributes
-    ----------
-    seconds, uncertainty : median over the axes and its uncertainty, s
-    axes : degree of freedom -> both of its answer
+    Returns
+    -------
+    delay : ready for JSON; `seconds` and `uncertainty`, the median over the axes, `option`, the
+        same for `auv linearize`, and `axes`, degree of freedom -> seconds and uncertainty
 
     """
-
-    seconds: float
-    uncertainty: float
-    axes: Mapping[str, tuple[float, float]]
-
-    @property
-    def option(self) -> str:
-        """The same as an option of `auv linearize`."""
-        return f'--delay {self.seconds:.3g}'
-
-    def document(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        axes = {
-            dof: {'seconds': delay, 'uncertainty': error}
-            for dof, (delay, error) in self.axes.items()
-        }
-        return {
-            'seconds': self.seconds,
-            'uncertainty': self.uncertainty,
-            'option': self.option,
-            'axes': axes,
-        }
-
-
-def command_to_response_delay(evidence: DriverRecord) -> Delay | None:
-    """Delay of the answers whose sign is told; None where none is."""
     told = [one for one in evidence.answered if one.response.sign]
     # a short pulse bounds the delay that it can tell
     within = [one for one in told if one.response.delay + FINE < one.trial.pulse / 2] or told
-    axes = {one.trial.dof: (one.response.delay, one.response.delay_error) for one in within}
+    axes = {
+        one.trial.dof: {'seconds': one.response.delay, 'uncertainty': one.response.delay_error}
+        for one in within
+    }
     if not axes:
         return None
-    delays, errors = np.array(list(axes.values())).T
+    delays, errors = np.array([[*axis.values()] for axis in axes.values()]).T
     # what the model is off by is off in every axis: many of them make it no surer
     scatter = DEVIATION * np.median(np.abs(delays - np.median(delays)))
-    error = max(float(np.sqrt((errors**2).mean())), float(scatter))
-    return Delay(float(np.median(delays)), error, axes)
+    seconds, error = float(np.median(delays)), max(np.sqrt((errors**2).mean()), scatter)
+    option = f'--delay {seconds:.3g}'
+    return {'seconds': seconds, 'uncertainty': float(error), 'option': option, 'axes': axes}
 
 
 def response_delay(evidence: DriverRecord) -> CheckResult:
@@ -158,17 +135,14 @@ def response_delay(evidence: DriverRecord) -> CheckResult:
     delay = command_to_response_delay(evidence)
     if delay is None:
         return unchecked(expected, 'no answer that is like the model')
-    most = max(seconds for seconds, _ in delay.axes.values())
-    found = f'{delay.seconds:.2f} ± {delay.uncertainty:.2f} s (median of {len(delay.axes)}), '
+    seconds, error, axes = delay['seconds'], delay['uncertainty'], delay['axes']
+    most = max(axis['seconds'] for axis in axes.values())
+    found = f'{seconds:.2f} ± {error:.2f} s (median of {len(axes)}), '
     found += f'{"at least " if most >= LATEST else ""}{most:.2f} s at most; '
-    found += f'for gains with margins: auv linearize SCENARIO {delay.option}'
+    found += f'for gains with margins: auv linearize SCENARIO {delay["option"]}'
     advice = 'what waits on the way? a delay takes stability from every gain'
-    numbers = {
-        'median_s': delay.seconds,
-        'uncertainty_s': delay.uncertainty,
-        'largest_s': most,
-    }
-    return judged(delay.seconds <= PROMPT, expected, found, advice, **numbers)
+    numbers = {'median_s': seconds, 'uncertainty_s': error, 'largest_s': most}
+    return judged(seconds <= PROMPT, expected, found, advice, **numbers)
 
 
 def silence(evidence: DriverRecord) -> CheckResult:

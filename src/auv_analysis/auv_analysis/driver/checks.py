@@ -3,7 +3,7 @@
 Graph checks: who publishes and subscribes what, and whether their QoS lets them hear it.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 from itertools import groupby
@@ -15,8 +15,9 @@ from rich.text import Text
 
 from auv_analysis.bag.step_topics import ODOMETRY as ODOM_TYPE
 from auv_analysis.bag.step_topics import WRENCH as WRENCH_TYPE
-from auv_analysis.driver import odometry_checks, twist_checks
+from auv_analysis.driver import odometry_checks as messages
 from auv_analysis.driver import response_checks as response
+from auv_analysis.driver import twist_checks as twist
 from auv_analysis.driver.evidence import (
     FAIL,
     NOT_CHECKED,
@@ -184,7 +185,7 @@ def driver(evidence: DriverRecord) -> str:
 
 def odometry(evidence: DriverRecord) -> str:
     """Need of a message."""
-    return driver(evidence) or ('' if len(evidence.log.arrived_ns) else odometry_checks.MUTE)
+    return driver(evidence) or ('' if len(evidence.log.arrived_ns) else messages.MUTE)
 
 
 def motion(evidence: DriverRecord) -> str:
@@ -224,58 +225,33 @@ class Check(NamedTuple):
         return replace(found, id=self.id)
 
 
-def _check(
-    group: str, needs: Callable[[DriverRecord], str], judge: Callable[[DriverRecord], CheckResult]
-) -> Check:
-    return Check(judge.__name__, group, _title(judge), needs, judge)
-
-
-def _per_dof(
-    group: str,
-    needs: Callable[[DriverRecord], str],
-    judge: Callable[[str, DriverRecord], CheckResult],
-) -> list[Check]:
-    """A check for each degree of freedom."""
-    name, title = judge.__name__, _title(judge)
-    return [
-        Check(f'{name}_{dof}', group, f'{title}: {dof}', needs, partial(judge, dof)) for dof in DOFS
-    ]
-
-
-def _title(judge: Callable[..., CheckResult]) -> str:
-    return (judge.__doc__ or '').removesuffix('.')
+def _checks(
+    group: str, needs: Callable[[DriverRecord], str], *judges: Callable[..., CheckResult]
+) -> Iterator[Check]:
+    """Checks named and described by their functions; two of these once per degree of freedom."""
+    for judge in judges:
+        name, title = judge.__name__, (judge.__doc__ or '').removesuffix('.')
+        if judge not in (twist.axis, response.response):
+            yield Check(name, group, title, needs, judge)
+            continue
+        for dof in DOFS:
+            yield Check(f'{name}_{dof}', group, f'{title}: {dof}', needs, partial(judge, dof))
 
 
 CHECKS = {
     check.id: check
     for check in (
-        _check('endpoints', nothing, odom_publisher),
-        _check('endpoints', nothing, wrench_subscriber),
-        _check('endpoints', nothing, wrench_publishers),
-        _check('endpoints', nothing, clock),
-        _check('qos', nothing, qos_controller),
-        _check('qos', nothing, qos_recorder),
-        _check('qos', nothing, qos_wrench),
-        _check('values', odometry, odometry_checks.frames),
-        _check('values', odometry, odometry_checks.finite),
-        _check('values', odometry, odometry_checks.quaternion_norm),
-        _check('values', odometry, odometry_checks.upright),
-        _check('values', odometry, odometry_checks.depth),
-        _check('values', motion, odometry_checks.speeds),
-        _check('values', motion, odometry_checks.jumps),
-        _check('time', driver, odometry_checks.rate),
-        _check('time', odometry, odometry_checks.gaps),
-        _check('time', odometry, odometry_checks.stamps),
-        _check('time', odometry, odometry_checks.age),
-        _check('time', odometry, odometry_checks.drift),
-        _check('motion', motion, twist_checks.twist_frame),
-        _check('motion', motion, twist_checks.angular_frame),
-        *_per_dof('motion', motion, twist_checks.axis),
-        _check('motion', motion, twist_checks.velocity_bias),
-        _check('response', wrenches, response.actuation),
-        *_per_dof('response', wrenches, response.response),
-        _check('response', wrenches, response.response_delay),
-        _check('response', wrenches, response.silence),
+        *_checks('endpoints', nothing, odom_publisher, wrench_subscriber, wrench_publishers, clock),
+        *_checks('qos', nothing, qos_controller, qos_recorder, qos_wrench),
+        *_checks('values', odometry, messages.frames, messages.finite, messages.quaternion_norm),
+        *_checks('values', odometry, messages.upright, messages.depth),
+        *_checks('values', motion, messages.speeds, messages.jumps),
+        *_checks('time', driver, messages.rate),
+        *_checks('time', odometry, messages.gaps, messages.stamps, messages.age, messages.drift),
+        *_checks('motion', motion, twist.twist_frame, twist.angular_frame, twist.axis),
+        *_checks('motion', motion, twist.velocity_bias),
+        *_checks('response', wrenches, response.actuation, response.response),
+        *_checks('response', wrenches, response.response_delay, response.silence),
     )
 }
 PASSIVE = [id for id, check in CHECKS.items() if check.group != 'response']

@@ -30,7 +30,7 @@ LAST = round(GOODBYE / PERIOD)
 
 def sent_by(driver: SimulatedDriver, stopped=lambda: False):
     plan = planned(driver.vehicle, ('surge', 'yaw'), 0.1, None, None)
-    return carry_out(driver, plan, 0.5, stopped, lambda _: None)
+    return carry_out(driver, plan, 0.5, stopped)
 
 
 def test_it_begins_and_ends_with_zero_and_goes_both_ways() -> None:

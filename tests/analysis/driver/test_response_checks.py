@@ -61,7 +61,7 @@ def exchanged(one: str, other: str):
 
 def evidence_of(driver: SimulatedDriver, *axes: str, raised: float = 0.0) -> DriverRecord:
     plan = planned(driver.vehicle, axes, 0.1, None, None, raised)
-    excitation = carry_out(driver, plan, 0.5, lambda: False, lambda _: None)
+    excitation = carry_out(driver, plan, 0.5, lambda: False)
     return DriverRecord(graph(), driver.log(), Settings(), excitation)
 
 

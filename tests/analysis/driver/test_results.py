@@ -51,7 +51,7 @@ def listened(**fields: object) -> DriverRecord:
 def commanded() -> DriverRecord:
     driver = SimulatedDriver(noise=1e-3)
     plan = plan_of(driver.vehicle, ['surge'], 0.1, None, None)
-    excitation = carry_out(driver, plan, 0.5, lambda: False, lambda _: None)
+    excitation = carry_out(driver, plan, 0.5, lambda: False)
     return DriverRecord(graph(), driver.log(), Settings(actuates=True), excitation)
 
 

@@ -6,6 +6,7 @@ zero however it ends.
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import groupby
@@ -177,31 +178,24 @@ def actuate(client: DriverClient, plan: Plan, timeout: float) -> Excitation:
 
     """
     stop = Event()  # a signal only asks for an end: zero is sent before it is one
-    with on_signals(stop.set):
-        try:
-            return _announced(client, plan, timeout, stop.is_set)
-        finally:
-            client.retire()
-
-
-def _announced(
-    client: DriverClient, plan: Plan, timeout: float, stopped: Callable[[], bool]
-) -> Excitation:
-    for line in plan.lines():
-        say(line)
-    client.advertise()  # nothing is sent yet, but whoever else is about to command sees it
-    for left in range(COUNTDOWN, 0, -1):
-        say(f'begins in {left} s')
-        _wait(client, 1.0, stopped)
-    if others := client.others():
-        return Excitation(plan, (), f'{join(others)} publishes the wrench as well')
-    until = time.monotonic() + MATCHES
-    while not client.advertise():
-        if time.monotonic() > until:
-            why = f'the driver does not hear a publisher within {MATCHES:g} s'
-            return Excitation(plan, (), why)
-        _wait(client, LOOK_AGAIN, stopped)
-    return carry_out(client, plan, timeout, stopped, lambda trial: say(f'{trial.dof} ...'))
+    with ExitStack() as stack:
+        stack.enter_context(on_signals(stop.set))
+        stack.callback(client.retire)
+        for line in plan.lines():
+            say(line)
+        client.advertise()  # nothing is sent yet, but whoever else is about to command sees it
+        for left in range(COUNTDOWN, 0, -1):
+            say(f'begins in {left} s')
+            _wait(client, 1.0, stop.is_set)
+        if others := client.others():
+            return Excitation(plan, (), f'{join(others)} publishes the wrench as well')
+        until = time.monotonic() + MATCHES
+        while not client.advertise():
+            if time.monotonic() > until:
+                why = f'the driver does not hear a publisher within {MATCHES:g} s'
+                return Excitation(plan, (), why)
+            _wait(client, LOOK_AGAIN, stop.is_set)
+        return carry_out(client, plan, timeout, stop.is_set)
 
 
 def _wait(client: DriverClient, seconds: float, stopped: Callable[[], bool]) -> None:
@@ -213,11 +207,7 @@ def _wait(client: DriverClient, seconds: float, stopped: Callable[[], bool]) -> 
 
 
 def carry_out(
-    client: DriverClient,
-    plan: Plan,
-    timeout: float,
-    stopped: Callable[[], bool],
-    begins: Callable[[Trial], None],
+    client: DriverClient, plan: Plan, timeout: float, stopped: Callable[[], bool]
 ) -> Excitation:
     """Send the wrenches of a plan; the last ones are zero, however it ends.
 
@@ -227,7 +217,6 @@ def carry_out(
     plan : what
     timeout : s of silence of the odometry that end it
     stopped : whether the user wants an end
-    begins : is told of each trial
 
     Raises
     ------
@@ -238,7 +227,7 @@ def carry_out(
     try:
         guard = MotionGuard(client, plan.speed, timeout, stopped)
         for trial in plan.trials:
-            begins(trial)
+            say(f'{trial.dof} ...')
             done.append(Sent(trial))
             _send(client, guard, done[-1])
     except AbortError as error:

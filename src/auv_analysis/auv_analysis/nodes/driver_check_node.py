@@ -6,7 +6,6 @@ subscribes with best effort: nobody waits for it.
 
 import time
 from collections.abc import Iterable, Mapping
-from itertools import starmap
 from typing import Any
 
 from geometry_msgs.msg import WrenchStamped
@@ -114,10 +113,6 @@ def _endpoint(info: Any) -> Endpoint:
     return Endpoint(full_name(info), info.topic_type, *policies)
 
 
-def _of(ends: Iterable[Any], kind: str = ODOMETRY) -> list[QoSProfile]:
-    return [end.qos_profile for end in ends if end.topic_type == kind]
-
-
 def _nodes(found: Iterable[tuple[str, Any]]) -> dict[str, tuple[str, ...]]:
     """Topic -> its nodes."""
     nodes: dict[str, set[str]] = {}
@@ -137,11 +132,6 @@ def _spelled(qos: QoSProfile) -> QoSProfile:
         liveliness=LivelinessPolicy.AUTOMATIC,
         liveliness_lease_duration=Infinite,
     )
-
-
-def _conflict(pairs: Iterable[tuple[QoSProfile, QoSProfile]]) -> str:
-    """Why a publisher and a subscription of some pairs do not match, or an empty text."""
-    return next(filter(None, starmap(qos_conflict, pairs)), '')
 
 
 class RosDriverClient(Participant):
@@ -192,6 +182,14 @@ class RosDriverClient(Participant):
         clocks = node.get_publishers_info_by_topic(topics.CLOCK.name)
         names = [name for name, _ in node.get_topic_names_and_types()]
         rest = [name for name in names if name not in (odom, wrench)]
+        controller, every = map(_spelled, (topics.newest_measurement(), topics.every_step()))
+        given = [one.qos_profile for one in odometry if one.topic_type == ODOMETRY]
+        taken = [one.qos_profile for one in takers if one.topic_type == WRENCH]
+        conflicts = {
+            'controller': [qos_conflict(one, controller) for one in given],
+            'recorder': [qos_conflict(one, every) for one in given],
+            'wrench': [qos_conflict(every, one) for one in taken],
+        }
         return GraphSnapshot(
             place,
             odom,
@@ -200,17 +198,7 @@ class RosDriverClient(Participant):
             wrench_publishers=tuple(map(_endpoint, other_publishers(node, wrench))),
             wrench_subscribers=tuple(map(_endpoint, takers)),
             clock_publishers=tuple(map(_endpoint, clocks)),
-            conflicts={
-                'controller': _conflict(
-                    (one, _spelled(topics.newest_measurement())) for one in _of(odometry)
-                ),
-                'recorder': _conflict(
-                    (one, _spelled(topics.every_step())) for one in _of(odometry)
-                ),
-                'wrench': _conflict(
-                    (_spelled(topics.every_step()), one) for one in _of(takers, WRENCH)
-                ),
-            },
+            conflicts={key: next(filter(None, found), '') for key, found in conflicts.items()},
             elsewhere=_nodes(
                 (name, one)
                 for name in rest

@@ -114,6 +114,22 @@ def test_numbers_of_every_kind_come_in_and_broken_messages_are_errors(ears: Ears
         ears.until(lambda t=topic, n=before: ears.topic(t).refused > n)
 
 
+def test_a_message_is_refused_once_and_under_the_name_of_its_topic(ears: Ears) -> None:
+    odd = convert.wrench(0, (1.0,) * 6, FRAMES)
+    odd.header.stamp.sec = -1
+    ears.listener.listen()
+    said = ears.listener._node._callbacks
+    said[topics.WRENCH](bytes(serialize_message(odd)), {})
+    said[topics.PROGRESS](b'\x00\x01\x00\x00', {})
+    told = [(alert.text, alert.count) for alert in ears.snapshot().alerts]
+    assert told == [
+        ('recorder/progress: expected a message with a stamp, found 4 bytes', 1),
+        ('wrench: no stamp: expected 0 s or later, found -1 s and 0 ns', 1),
+    ]
+    for topic in (topics.WRENCH, topics.PROGRESS):
+        assert (ears.topic(topic).refused, ears.topic(topic).heard) == (1, 0)
+
+
 def test_what_nodes_say_of_themselves_is_told(ears: Ears) -> None:
     levels = {0: 'ok', 1: 'warning', 2: 'error', 3: 'stale', 9: 'stale'}
     said = [

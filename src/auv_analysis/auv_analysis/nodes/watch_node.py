@@ -82,7 +82,7 @@ class WatchNode(BulkNode):
         subscription = self.create_subscription(
             topic.type,
             topic.name,
-            self._guarded(topic),
+            self._callbacks[topic],
             topics.best_effort(DEPTH),
             event_callbacks=events,
             raw=True,
@@ -93,41 +93,34 @@ class WatchNode(BulkNode):
         self.data_subscriptions().sort(key=lambda one: one.topic_name != setpoints)
         return subscription
 
-    def _guarded(self, topic: topics.Topic) -> Any:
-        """The callback of a topic, with bytes that are no message refused."""
-
-        def take(data: bytes, info: dict[str, Any]) -> None:
-            try:
-                self._callbacks[topic](data, info)
-            except BadMessageError as error:
-                self._monitor.refuse(self._now, topic.name, str(error))
-
-        return take
-
     def _callback(self, topic: topics.Topic) -> Callable[[bytes, dict[str, Any]], None]:
-        if topic is topics.DIAGNOSTICS:
-            return self._on_diagnostics
-        known = topic.type in KINDS
-        decode = Codec(topic.type, self._frames, topic.name).decode if known else None
+        """Callback of a topic; a message that must not be used is refused, and once."""
+        name = topic.name
+        codec = Codec(topic.type, self._frames, name) if topic.type in KINDS else None
 
         def take(data: bytes, info: dict[str, Any]) -> None:
-            now, number, values = self._now, _number(info), None
+            ns, values = None, None
             try:
-                values = decode(data)[1] if decode else None
+                ns = first_stamp(data)
+                if codec is not None:
+                    _, values = codec.decode(data)
+                elif topic is topics.DIAGNOSTICS:
+                    self._diagnose(message_of(data, DiagnosticArray, name))
             except BadMessageError as error:
-                self._monitor.refuse(now, topic.name, str(error))
-            self._monitor.hear(now, topic.name, number, first_stamp(data), values)
+                text = str(error).removeprefix(name).removeprefix(': ')
+                self._monitor.refuse(self._now, name, f'{name}: {text}')
+            if ns is not None:
+                number = info.get('publication_sequence_number')
+                self._monitor.hear(self._now, name, number, ns, values)
 
         return take
 
-    def _on_diagnostics(self, data: bytes, info: dict[str, Any]) -> None:
-        now, name = self._now, topics.DIAGNOSTICS.name
-        self._monitor.hear(now, name, _number(info), first_stamp(data), None)
-        for status in message_of(data, DiagnosticArray, name).status:
+    def _diagnose(self, message: DiagnosticArray) -> None:
+        for status in message.status:
             level = LEVELS[min(int.from_bytes(status.level, 'little'), len(LEVELS) - 1)]
             facts = {pair.key: pair.value for pair in status.values}
             state = NodeState(status.name, level, status.message, 0.0, facts)
-            self._monitor.diagnose(now, state)
+            self._monitor.diagnose(self._now, state)
 
     def _incompatible(self, topic: topics.Topic, event: Any) -> None:
         policy = QoSPolicyKind(event.last_policy_kind).name.lower()
@@ -141,10 +134,6 @@ class WatchNode(BulkNode):
         ending, truth = (f'/{topic.name}' for topic in (topics.ODOM, topics.GROUND_TRUTH))
         found = [name for name in names if name.endswith(ending) and not name.endswith(truth)]
         return sorted(name.removesuffix(ending) or '/' for name in found)
-
-
-def _number(info: dict[str, Any]) -> int | None:
-    return info.get('publication_sequence_number')
 
 
 class Listener(Participant):

@@ -24,10 +24,10 @@ from auv_analysis.bag.output import LEAST_DURATION, LEAST_SIZE, Storage
 from auv_analysis.bag.ros2msg import schema_text
 from auv_analysis.bag.writer import BagWriter
 from auv_analysis.graph.node_settings import ALL, RecorderSettings
-from auv_dynamics.files.errors import InputError, first_line, reason
+from auv_dynamics.files.errors import InputError, first_line, refusing
 from auv_dynamics.files.nearest import meant
 from auv_dynamics.files.yaml_files import read_text
-from auv_dynamics.ros import interface, topics
+from auv_dynamics.ros import topics
 from auv_dynamics.ros.endpoints import qos_conflict
 from auv_dynamics.ros.interface import DEPTH, GLOBALS, NANOSECONDS
 from auv_dynamics.ros.node_main import BulkNode
@@ -228,7 +228,7 @@ class GraphClock:
 
 def make_writer(node: Node, p: RecorderSettings) -> BagWriter:
     """Open the bag, once the settings are checked; InputError when something is wrong."""
-    name, known = node.get_name(), [topic.name for topic in topics.STEP_TOPICS]
+    name, bag, known = node.get_name(), Path(p.bag), [topic.name for topic in topics.STEP_TOPICS]
     for topic in p.topics:
         if topic not in known:
             listed = f'step topics: {", ".join(known)}{meant(topic, known)}'
@@ -239,8 +239,24 @@ def make_writer(node: Node, p: RecorderSettings) -> BagWriter:
         source = Path(path if equals else label)
         attachments[label if equals else source.name] = read_text(source, 'attachment')
     attachments[RECORDING] = recording_text(p.strict, remapped(node), node.get_namespace())
+    if 0 < p.max_duration < LEAST_DURATION:
+        expected = f'0 for one file, or at least {LEAST_DURATION:g} s'
+        raise InputError(name, 'storage.max_duration', expected, p.max_duration)
+    least = LEAST_SIZE + sum(len(text.encode()) for text in attachments.values())
+    if 0 < p.max_size < least:
+        expected = f'0 for one file, or at least {least} bytes with these attachments'
+        raise InputError(name, 'storage.max_size', expected, p.max_size)
+    if p.free_space:
+        there = next((folder for folder in bag.absolute().parents if folder.is_dir()), Path('/'))
+        free = shutil.disk_usage(there).free
+        if free < p.free_space:
+            expected = f'at most what is free on the file system of {bag}'
+            raise InputError(name, 'storage.free_space', expected, f'{free} bytes free')
+    longest = round(p.max_duration * NANOSECONDS)
     pace = node.resolve_topic_name(p.topics[0]) if p.topics else ''
-    return _writer(name, Path(p.bag), attachments, _storage(name, p, pace))
+    storage = Storage(p.compression, p.chunk_size, p.max_size, longest, pace, p.free_space)
+    with refusing(bag, '', 'a folder without a bag that can be written'):
+        return BagWriter(bag, attachments, storage)
 
 
 def make_wanted(node: Node, p: RecorderSettings) -> Wanted:
@@ -268,30 +284,3 @@ def remapped(node: Node) -> dict[str, str]:
         if (resolved := node.resolve_topic_name(topic.name)) != usual:
             names[resolved] = usual
     return names
-
-
-def _storage(name: str, p: RecorderSettings, pace: str) -> Storage:
-    if 0 < p.max_duration < LEAST_DURATION:
-        expected = f'0 for one file, or at least {LEAST_DURATION:g} s'
-        raise InputError(name, 'storage.max_duration', expected, p.max_duration)
-    longest = round(p.max_duration * interface.NANOSECONDS)
-    return Storage(p.compression, p.chunk_size, p.max_size, longest, pace, p.free_space)
-
-
-def _writer(name: str, bag: Path, attachments: dict[str, str], storage: Storage) -> BagWriter:
-    """Open the bag."""
-    least = LEAST_SIZE + sum(len(text.encode()) for text in attachments.values())
-    if 0 < storage.max_size < least:
-        expected = f'0 for one file, or at least {least} bytes with these attachments'
-        raise InputError(name, 'storage.max_size', expected, storage.max_size)
-    if storage.free_space:
-        there = next((folder for folder in bag.absolute().parents if folder.is_dir()), Path('/'))
-        free = shutil.disk_usage(there).free
-        if free < storage.free_space:
-            expected = f'at most what is free on the file system of {bag}'
-            raise InputError(name, 'storage.free_space', expected, f'{free} bytes free')
-    try:
-        return BagWriter(bag, attachments, storage)
-    except OSError as error:
-        found = reason(error)
-        raise InputError(bag, '', 'a folder without a bag that can be written', found) from None

@@ -7,10 +7,12 @@ from typing import Any
 import pytest
 
 from auv_analysis.graph import recorded_runs
+from auv_analysis.graph.node_parameters import parameter_file
 from auv_analysis.graph.recorded_runs import FreeGraph, recorded
 from auv_analysis.graph.supervisor import NodeDiedError, TroubleError
 from auv_analysis.output.folder import ResultsFolder
 from auv_dynamics.files.errors import FailedError
+from auv_dynamics.files.yaml_files import read_yaml
 
 FIRST, SECOND, DEAD = TroubleError('first'), TroubleError('second'), NodeDiedError('dead')
 
@@ -26,13 +28,15 @@ FIRST, SECOND, DEAD = TroubleError('first'), TroubleError('second'), NodeDiedErr
 def test_after_trouble_the_others_run_and_after_a_death_none(
     fails: dict[str, FailedError], run: str, done: str, failure: Any, tmp_path: Path, monkeypatch
 ) -> None:
-    results = ResultsFolder(tmp_path / 'unfinished', tmp_path)
+    out_of_ascii = tmp_path / f"Prüfung, d'été{20 * ' 2026'}"  # YAML escapes and folds it
+    results = ResultsFolder(out_of_ascii / 'unfinished', out_of_ascii)
     asked = []
 
     def run_controller(_: object, name: str, out: Path, domain: int, *__: object, composed: bool):
         asked.append((name, domain, composed))
         (out / name).mkdir(parents=True)
-        (out / name / 'params.yaml').write_text(f'bag: {out}/{name}')
+        text = parameter_file({'recorder_node': {'bag': f'{out}/{name}'}}, 'made')
+        (out / name / 'params.yaml').write_text(text)
         if name in fails:
             raise fails[name]
 
@@ -44,7 +48,8 @@ def test_after_trouble_the_others_run_and_after_a_death_none(
     assert asked == [(name, 7, True) for name in run]
     assert found == {name: name for name in done}
     assert error is failure
-    place = tmp_path / 'unfinished' if fails else tmp_path
+    place = results.folder if fails else results.out
     for name in done:
-        text = (results.folder / name / 'params.yaml').read_text()
-        assert text == f'bag: {place}/{name}', 'where it lies in the end'
+        data = read_yaml(results.folder / name / 'params.yaml', 'parameter')
+        told = data['/**/recorder_node']['ros__parameters']['bag']
+        assert told == f'{place}/{name}', 'where it lies in the end'

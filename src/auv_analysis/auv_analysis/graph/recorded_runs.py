@@ -1,5 +1,6 @@
 """Recorded runs of a scenario's controllers on a domain of their own, read back from their bags."""
 
+import json
 import os
 import time
 from collections.abc import Iterator
@@ -16,11 +17,13 @@ from auv_analysis.graph.experiment import MODULES, environment, run_controller
 from auv_analysis.graph.fork_server import ForkServer
 from auv_analysis.graph.supervisor import Begin, NodeDiedError, TroubleError
 from auv_analysis.output.folder import ResultsFolder
+from auv_analysis.output.new_files import write
 from auv_analysis.output.progress import Speed, bar, count, say, waiting
 from auv_analysis.runs.run import Run
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.simulate import warm_up
 from auv_dynamics.files.errors import FailedError, InputError
+from auv_dynamics.files.yaml_files import parse_yaml, yaml_text
 
 
 class FreeGraph(NamedTuple):
@@ -110,9 +113,10 @@ def recorded(
 
 def _move_paths(parameters: Path, results: ResultsFolder) -> None:
     """Let a parameter file name the files of the run where they lie in the end."""
-    text = parameters.read_text(encoding='utf-8')
-    before, then = (str(path.resolve()) for path in results)
-    parameters.write_text(text.replace(before, then), encoding='utf-8')
+    comment, _, body = parameters.read_text(encoding='utf-8').partition('\n')
+    before, then = (json.dumps(str(path.resolve()))[1:-1] for path in results)
+    text = json.dumps(parse_yaml(body, parameters, 'parameter')).replace(before, then)
+    write(parameters, f'{comment}\n{yaml_text(json.loads(text))}'.encode())
 
 
 def _refuse_strangers(graph: Any, domain: int) -> None:

@@ -53,9 +53,11 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse; an option that is not known is refused before one that is missing."""
         args = sys.argv[1:] if args is None else list(args)
-        unknown = self._unknown(args)
-        if unknown:
-            self._refuse(unknown)
+        if option := self._unknown(args):
+            from auv_dynamics.files.nearest import meant
+
+            known = (name for name in self._option_string_actions if name[:2] == '--')
+            self.error(f'expected an option of {self.prog}{meant(option, known)}, found {option}')
         return super().parse_known_args(args, namespace)
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
@@ -88,12 +90,6 @@ class Parser(argparse.ArgumentParser):
             if name.startswith('--') and not any(option.startswith(name) for option in known):
                 return name
         return ''
-
-    def _refuse(self, option: str) -> None:
-        from auv_dynamics.files.nearest import meant
-
-        likely = meant(option, (name for name in self._option_string_actions if name[:2] == '--'))
-        self.error(f'expected an option of {self.prog}{likely}, found {option}')
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from auv_analysis.cli.arguments import add_delay, add_results, number
+from auv_analysis.cli.arguments import add_delay, add_results, number, refuse_given
 from auv_dynamics.files.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,11 +60,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         for name in names:
             subject.controller(name)
     else:
-        for option in ('controller', 'delay', 'delay_from', 'lag'):
-            if getattr(options, option) is not None:
-                expected = 'a scenario, which has controllers'
-                name = f'--{option.replace("_", "-")}'
-                raise InputError(paths[0], name, expected, 'a vehicle')
+        expected, found = 'a scenario, which has controllers', f'{paths[0]}, a vehicle'
+        refuse_given(options, ('controller', 'delay', 'delay_from', 'lag'), expected, found)
     delay = options.delay if options.delay_from is None else measured_delay(options.delay_from)
     eta0 = None if options.attitude is None else [0.0, 0.0, 0.0, *options.attitude]
     try:

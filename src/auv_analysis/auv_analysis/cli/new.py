@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.cli.arguments import VEHICLE
+from auv_analysis.cli.arguments import VEHICLE, refuse_given
 from auv_dynamics.files.errors import InputError, refusing
 
 
@@ -28,8 +28,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     kind, vehicle = options.kind, options.vehicle
     name = checked_name(kind, options.name)
     if kind == 'vehicle':
-        if vehicle is not None:
-            raise InputError('--vehicle', '', 'a scenario or a law to be made', 'vehicle')
+        refuse_given(options, ('vehicle',), 'a scenario or a law to be made', 'vehicle')
         files = vehicle_files(name)
     else:
         files = (scenario_files if kind == 'scenario' else law_files)(name, vehicle)

@@ -203,10 +203,11 @@ def test_a_listener_without_a_name_gets_no_command_before_it_has_one(monkeypatch
     ours.qos_profile = topics.every_step()
     found: list = []
     monkeypatch.setattr(replay_publishers, 'other_subscribers', lambda node, topic: found)
-    node = SimpleNamespace(get_name=lambda: 'replay', count_subscribers=lambda topic: len(found))
     complaints: list[str] = []
+    node = SimpleNamespace(get_name=lambda: 'replay', count_subscribers=lambda topic: len(found))
+    node.graph = SimpleNamespace(complain=complaints.append)
     wrench = {'/wrench': SimpleNamespace(topic_name='/wrench')}
-    guard = CommandGuard(node, wrench, False, complaints.append)
+    guard = CommandGuard(node, wrench, False)
     assert guard.may('/wrench', 0.0)
     found.append(unnamed)
     assert guard.refusal(final=False) is None

@@ -133,7 +133,6 @@ class Player:
     loops : how often the end was reached
     now_ns : log time of the last message
     ended : whether all has been played, and taken
-    failure : why it cannot go on; empty: it can
 
     """
 
@@ -145,7 +144,7 @@ class Player:
             raise nothing_left(index, selection)
         foreign = settings.allow_commands_to_foreign
         guarded = {topic: self._publishers[topic] for topic in selection.guarded}
-        self.guard = CommandGuard(node, guarded, foreign, node.graph.complain)
+        self.guard = CommandGuard(node, guarded, foreign)
         self.commands = Commands(guarded, foreign)
         self.receivers = Receivers(node, self._publishers)
         self._answers = Answers(node.graph, settings.answers) if settings.answers else None
@@ -156,7 +155,7 @@ class Player:
         self.published: Counter[str] = Counter()
         self.loops, self.now_ns = 0, plan.begin
         self._clock_ns: int | None = None  # that was published last
-        self.ended, self.failure = False, ''
+        self.ended = False
         self._stream = self._rewound()
         self._next: PlayedMessage | None = None
 
@@ -210,12 +209,13 @@ class Player:
         self._end_of_bag()
         return SOON
 
-    def look(self, now: float) -> None:
-        """Look who listens."""
+    def look(self, now: float) -> str:
+        """Look who listens; why it cannot go on, or an empty text."""
         self.receivers.find()
         self.guard.look(now)
         if self._answers and not self.playback.paused:
-            self.failure = self._answers.overdue()
+            return self._answers.overdue()
+        return ''
 
     def pause(self) -> None:
         """Hold; a vehicle that hears the commands is then left without a wrench."""
@@ -365,12 +365,10 @@ class ReplayNode(BulkNode):
         if self.exit_code is not None or not self.playing:
             return
         now = time.monotonic()
-        self.player.look(now)
-        rival = self._rival(now)
-        failure = str(rival) if rival is not None else self.player.failure
-        if failure:
-            self.failure = failure
-            self.get_logger().error(failure)
+        overdue, rival = self.player.look(now), self._rival(now)
+        self.failure = str(rival or overdue)
+        if self.failure:
+            self.get_logger().error(self.failure)
             self.exit_code = 1
 
     def _rival(self, now: float) -> InputError | None:

@@ -3,9 +3,8 @@
 Flow control goes by acknowledgement and by the answers to odometry.
 """
 
-import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -166,7 +165,6 @@ class CommandGuard:
     node : that publishes them
     publishers : recorded name -> publisher, of the guarded commands alone
     foreign : publish them to whomever
-    complain : is told why commands have been stopped
 
     Attributes
     ----------
@@ -174,15 +172,8 @@ class CommandGuard:
 
     """
 
-    def __init__(
-        self,
-        node: Any,
-        publishers: Mapping[str, Any],
-        foreign: bool,
-        complain: Callable[[str], None],
-    ):
+    def __init__(self, node: Any, publishers: Mapping[str, Any], foreign: bool):
         self._node, self._publishers, self._foreign = node, publishers, foreign
-        self._complain = complain
         self._judged: dict[str, int] = {}  # topic -> number of subscribers that are known
         self._strange: dict[str, float] = {}  # topic -> since when one of them has no name
         self.stopped = ''
@@ -227,7 +218,7 @@ class CommandGuard:
         self._strange.pop(topic, None)
         if found:
             self.stopped = f'{", ".join(found)} on {publisher.topic_name}'
-            self._complain(f'commands are not published any more: {self.stopped}')
+            self._node.graph.complain(f'commands are not published any more: {self.stopped}')
             return False
         self._judged[topic] = count
         return True
@@ -236,7 +227,6 @@ class CommandGuard:
 WINDOW = 1000  # messages of a topic that may be under way: far fewer than subscribers keep
 ANSWERS = 2  # the first may come from the moment before the data arrived, the next does not
 PATIENCE = 10.0  # s, after which a subscriber that does not answer is not waited for any more
-LOOK = 0.2  # s between two looks at who subscribes
 READY = 'ready'
 NOW = Duration(seconds=0)
 
@@ -275,14 +265,10 @@ class Receivers:
         self._taken = dict(self._sent)
         self._clients: dict[str, Client] = {}
         self._round: _Round | None = None
-        self._found = -math.inf
         self.silent: list[str] = []
 
     def find(self) -> None:
-        """Look for subscribers that can be asked, now and then."""
-        if time.monotonic() - self._found < LOOK:
-            return
-        self._found = time.monotonic()
+        """Look for subscribers that can be asked."""
         services = {name for name, _ in self._node.get_service_names_and_types()}
         for publisher in self._publishers.values():
             for one in self._node.get_subscriptions_info_by_topic(publisher.topic_name):

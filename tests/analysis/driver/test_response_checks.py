@@ -22,6 +22,7 @@ from auv_analysis.driver.plan import HELD, LEVEL, PULSE, SWING, UNHEARD, ZERO, P
 from auv_analysis.driver.response import Noise, fit_response, predicted
 from auv_analysis.driver.response_checks import command_to_response_delay
 from auv_dynamics import Vehicle, load_vehicle
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle import DOFS
 
 pytestmark = pytest.mark.usefixtures('approved')
@@ -189,6 +190,19 @@ def test_the_bound_holds_whenever_a_driver_lets_go(name: str, raised: float) -> 
     for end in np.linspace(HELD, HELD + UNHEARD, 11):
         held = [(0.0, end, tau), (end, end + SWING, ZERO)]
         assert np.abs(predicted(vehicle, LEVEL, held).added).max() <= 1.01 * plan.trials[-1].speed
+
+
+def test_a_model_too_stiff_to_be_predicted_gets_no_wrench() -> None:
+    """Its predictions diverged, and the wrenches that followed from them were not finite."""
+    heavy = load_vehicle('bluerov2_heavy')
+
+    def plan(rate: float) -> Plan:
+        stiff = heavy.changed(D_linear=rate * heavy.M, D_quadratic=np.zeros((6, 6)))
+        return plan_of(stiff, (), 0.1, None, None)
+
+    assert all(0.0 < trial.size < np.inf for trial in plan(399.0).trials)
+    with pytest.raises(InputError, match=r': damping: expected .* 2\.5 ms.*, found 2\.4 ms'):
+        plan(410.0)
 
 
 def test_axes_without_thrusters_are_left_out(approved) -> None:

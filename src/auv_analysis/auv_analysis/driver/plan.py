@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from auv_analysis.driver.response import Wrench, predicted
+from auv_analysis.driver.response import FINER, STEPS, Wrench, predicted
 from auv_analysis.output.text import join
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle
 
@@ -23,6 +24,7 @@ HELD, UNHEARD = 0.5, 2.0  # s of a wrench, then of silence, to see whether the d
 LET_GO = 0.25  # s between two times at which a driver may let go
 SWING = 4.0  # s of zero in which a vehicle swings back
 ROUNDS = 4  # of making a wrench smaller: drag is not linear
+FASTEST = 2.0 * FINER / STEPS  # 1/s of the damping: beyond it the steps of a prediction diverge
 LEVEL = np.eye(13)[3]  # at rest, upright
 CALM = ('surge', 'sway', 'yaw', 'heave', 'roll', 'pitch')  # those first that nothing restores
 ZERO = (0.0,) * 6
@@ -146,7 +148,16 @@ def plan_of(
     force, torque : N and N m that none passes; none: only the speed limits them
     raised : m/s and rad/s in place of the speed, where thrusters would stay in their dead band
 
+    Raises
+    ------
+    InputError : the model is too stiff to be predicted
+
     """
+    damping = vehicle.D(np.full(6, max(speed, raised)))
+    rate = np.abs(np.linalg.eigvals(np.linalg.solve(vehicle.M, damping))).max()
+    if rate > FASTEST:
+        expected = f'time constants of at least {1e3 / FASTEST:g} ms, so that it can be predicted'
+        raise InputError(vehicle.name, 'damping', expected, f'{1e3 / rate:.2g} ms')
     lost = vehicle.thrusters.unactuated() if vehicle.thrusters is not None else {}
     asked = [dof for dof in DOFS if dof in (dofs or DOFS)]
     skipped = {dof: 'not asked for: --axis' for dof in DOFS if dof not in asked}

@@ -1,6 +1,8 @@
 """The replay node: everything again, in order and in time, as long as there is room for it."""
 
 import signal
+import struct
+from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -316,6 +318,22 @@ def test_names_the_answer_that_does_not_come(tmp_path: Path, monkeypatch) -> Non
         assert ended(peer, replay) == 1
         failure = 'no answer on other/wrench to the odometry of 0 s for 0.2 s'
         assert replay.failure == failure
+
+
+def test_an_odometry_without_a_stamp_is_refused_where_it_would_be_answered() -> None:
+    """The replay ended with a traceback."""
+    player, refused, out = object.__new__(replay_node.Player), [], []
+    graph: Any = SimpleNamespace(refuse=refused.append, subscribe=lambda *_: None)
+    player._node, player._publishers = SimpleNamespace(graph=graph), {}
+    player.commands = SimpleNamespace(check=lambda *_: None)
+    player.receivers, player.published = SimpleNamespace(sent=lambda _: None), Counter()
+    player._answers = replay_publishers.Answers(graph, 'wrench')
+    for topic, sec in (('/odom', -1), ('/odom', 1), ('/ground_truth/odom', -1)):
+        player._publishers[topic] = SimpleNamespace(publish=out.append)
+        player._publish(topic, ODOMETRY, b'\0\1\0\0' + struct.pack('<iI', sec, 0))
+    assert refused == ['/odom: no stamp: expected 0 s or later, found -1 s and 0 ns']
+    assert [len(one) for one in out] == [12, 12]
+    assert not player._answers.are_complete()
 
 
 def test_waits_for_a_subscriber_that_is_stopped(tmp_path: Path) -> None:

@@ -270,14 +270,15 @@ class Player:
     def _publish(self, topic: str, kind: str, data: bytes) -> None:
         try:
             self.commands.check(topic, data)
+            if self._answers is not None:
+                self._answers.expect(topic, kind, data)
         except BadMessageError as error:
-            self._node.graph.refuse(str(error))
+            text = str(error).removeprefix(topic).removeprefix(': ')
+            self._node.graph.refuse(f'{topic}: {text}')
             return
         self._publishers[topic].publish(data)
         self.receivers.sent(topic)
         self.published[topic] += 1
-        if self._answers is not None:
-            self._answers.sent(topic, kind, data)
 
     def _end_of_bag(self) -> None:
         """Wait until all has been taken; then end, or begin again."""

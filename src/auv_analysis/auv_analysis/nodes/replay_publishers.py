@@ -356,8 +356,8 @@ class Answers:
         if first_stamp(data) == self._asked:
             self._asked = None
 
-    def sent(self, topic: str, kind: str, data: bytes) -> None:
-        """Note a message that was published; of odometry, wait for the answer."""
+    def expect(self, topic: str, kind: str, data: bytes) -> None:
+        """Wait for the answer to an odometry that goes out; BadMessageError without a stamp."""
         if is_odometry(topic, kind):
             self._asked, self._since = first_stamp(data), time.monotonic()
 

@@ -336,8 +336,7 @@ def _in_use(folder: Path) -> set[str]:
 
 def files() -> Iterator[Finding]:
     """Limit of open files per process: a participant takes some dozens."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    limit = hard if soft == resource.RLIM_INFINITY else soft
+    limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     if limit == resource.RLIM_INFINITY:
         yield Finding('open files', 'ok', 'no limit')
         return

@@ -240,10 +240,8 @@ def fixed(value: float | None, digits: int = 4) -> str:
     return f'{value:z.{digits}f}' if abs(value) < 1000 else f'{value:.1e}'
 
 
-def short(value: float | None) -> str:
+def short(value: float) -> str:
     """Number in at most eight characters, with the decimals that its size leaves room for."""
-    if value is None:
-        return MISSING
     size = abs(value)
     if size >= 1e6:
         return f'{value:.1e}'

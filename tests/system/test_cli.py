@@ -526,7 +526,7 @@ def test_interrupt_that_python_drops_ends_the_command(monkeypatch, capsys) -> No
             time.sleep(0.01)
         return {}
 
-    monkeypatch.setattr('auv_analysis.cli.main._function', lambda _: command)
+    monkeypatch.setattr('auv_analysis.cli.doctor.run', command)
     assert _exit_code('doctor') == 1
     assert capsys.readouterr().err == 'interrupted\n'
 
@@ -545,7 +545,7 @@ def test_full_disk_ends_in_one_line(error, monkeypatch, capsys) -> None:
     def command(_: object) -> dict:
         raise error
 
-    monkeypatch.setattr('auv_analysis.cli.main._function', lambda _: command)
+    monkeypatch.setattr('auv_analysis.cli.simulate.run', command)
     assert _exit_code('simulate', 'case1') == 1
     text = error.strerror or str(error)
     (line,) = capsys.readouterr().err.splitlines()

@@ -13,7 +13,6 @@ import os
 import signal
 import sys
 import threading
-from argparse import Namespace
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -100,11 +99,6 @@ def _module(command: str) -> Any:
     return importlib.import_module(f'auv_analysis.cli.{command.replace("-", "_")}')
 
 
-def _function(command: str) -> Callable[[Namespace], dict[str, Any]]:
-    """Function of a subcommand: options in, a JSON-ready document out."""
-    return _module(command).run
-
-
 def _repeat_interrupt(dropped: Any) -> None:
     """Repeat a Ctrl-C that Python drops, since it came inside a callback of C.
 
@@ -140,7 +134,7 @@ def _main(arguments: list[str] | None) -> None:
         if signal.getsignal(number) == signal.SIG_DFL:
             signal.signal(number, signal.default_int_handler)
     try:
-        _work(_function(options.command), options)
+        _work(_module(options.command).run, options)
     except InputError as error:
         _say(str(error))
         sys.exit(2)

@@ -129,7 +129,8 @@ def _examine(
             write_samples(run, out / f'{name}.parquet')
     found = {} if options.sensitivity == 'none' else _sensitivities(options, scenario, runs)
     with waiting('judging the claims of the paper'):
-        claims = paper_claims(scenario, runs, found, hold=options.hold, threads=_threads())
+        cores = len(os.sched_getaffinity(0))
+        claims = paper_claims(scenario, runs, found, hold=options.hold, threads=cores)
     judged = claims if claims.claims or scenario.name in CASES else None
     said = claims_sentences(judged) if judged else []
     leading = min(runs.values(), key=lambda run: run.law != 'gvc').controller
@@ -155,12 +156,8 @@ def _sensitivities(
             found[name] = sensitivity(
                 scenario, name, method=options.sensitivity, count=options.samples,
                 span=options.span or SPAN, seed=options.seed or 0, hold=options.hold,
-                threads=_threads(),
+                threads=len(os.sched_getaffinity(0)),
             )  # fmt: skip
         if found[name].refusal:
             say(f'note: {name}: no sensitivity to the gains: {found[name].refusal}')
     return found
-
-
-def _threads() -> int:
-    return os.cpu_count() or 1

@@ -17,7 +17,7 @@ from contextlib import redirect_stderr, suppress
 from importlib import metadata
 from io import StringIO
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 OLDEST, NEWEST = (3, 11), (3, 13)
 OURS = ('auv_dynamics', 'auv_gvc_controller', 'auv_analysis')
@@ -98,11 +98,15 @@ def python() -> Iterator[Finding]:
 
 def packages() -> Iterator[Finding]:
     """Whether every package that ours ask for is there, of a fitting version, and loads."""
-    asked = {name: text for package in OURS for name, text in _asked(package)}
-    missing = [text for name, text in asked.items() if _version(name) is None]
-    wrong = [f'{name} {_version(name)}, not {text}' for name, text in asked.items()
-             if not _fits(text)]  # fmt: skip
-    modules = [MODULES.get(name, name.replace('-', '_')) for name in asked if _version(name)]
+    asked = {one.name.lower(): one for package in OURS for one in _asked(package)}
+    there = {name: _version(name) for name in asked}
+    missing = [str(one) for name, one in asked.items() if there[name] is None]
+    wrong = [
+        f'{name} {version}, not {asked[name]}'
+        for name, version in there.items()
+        if version and not asked[name].specifier.contains(version, prereleases=True)
+    ]
+    modules = [MODULES.get(name, name.replace('-', '_')) for name in asked if there[name]]
     failing = _failing([*modules, 'rclpy'])
     if missing:
         yield Finding('packages', 'broken', f'missing: {", ".join(missing)}', AGAIN)
@@ -115,14 +119,15 @@ def packages() -> Iterator[Finding]:
         yield Finding('packages', 'ok', f'{len(asked)} and rclpy, of fitting versions')
 
 
-def _asked(package: str) -> Iterator[tuple[str, str]]:
-    """Names of what a distribution of ours requires, and the requirements themselves."""
+def _asked(package: str) -> Iterator[Any]:
+    """Requirements of a distribution of ours, as far as they hold here."""
     from packaging.requirements import Requirement
 
     for text in metadata.requires(package) or ():
         requirement = Requirement(text)
         if requirement.marker is None or requirement.marker.evaluate({'extra': ''}):
-            yield requirement.name.lower(), text.partition(';')[0].strip()
+            requirement.marker = None  # which its text would tell
+            yield requirement
 
 
 def _version(name: str) -> str | None:
@@ -130,14 +135,6 @@ def _version(name: str) -> str | None:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return None
-
-
-def _fits(text: str) -> bool:
-    from packaging.requirements import Requirement
-
-    requirement = Requirement(text)
-    version = _version(requirement.name)
-    return version is None or requirement.specifier.contains(version, prereleases=True)
 
 
 def _failing(modules: list[str]) -> dict[str, str]:

@@ -63,5 +63,5 @@ def test_results_and_scenarios_are_compared(tmp_path: Path) -> None:
     places = 'a', 'simulated/scenario'
     assert list(summaries) == [f'{place}/{name}' for place in places for name in ('gvc', 'cl')]
     assert summaries['a/gvc'] == summaries['simulated/scenario/gvc']
-    assert {'ranking', 'errors', 'kinetic_energy', 'delta_xi'} <= drawn(tmp_path / 'both')
+    assert {'ranking', 'errors', 'kinetic_energy'} <= drawn(tmp_path / 'both')
     assert 'Warning' not in ended.stderr

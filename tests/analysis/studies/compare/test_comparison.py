@@ -164,18 +164,10 @@ def test_figures_scale_with_the_number_of_runs(entries, copies: int, tmp_path: P
             for i in range(copies) for e in entries]  # fmt: skip
     table = comparison_table(many)
     drawn = plots.draw(many, table, rank(table), tmp_path / 'figures')
-    assert set(drawn) == {'ranking', 'errors', 'kinetic_energy', *plots.SIX}
+    assert set(drawn) == {'ranking', 'errors', 'kinetic_energy'}
     few = copies == 1
     assert ('falls below the dotted 1' in drawn['errors'].caption) is few
     assert 'powers of two' in drawn['ranking'].caption
-
-
-def test_structural_zeros_are_told_from_what_is_zero(entries, table) -> None:
-    always = plots.structural(table, 'coupling.delta_xi_max')
-    assert always[0].tolist() == [False] * 4 + [True] * 2
-    assert always[2].all()
-    assert not always[4].any()
-    assert not plots.structural(table, 'effort.rms').any()
 
 
 def test_a_grid_of_panels_is_drawn_of_twelve_scenarios_at_most(entries) -> None:

@@ -9,7 +9,6 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from auv_analysis.metrics.measures import FAMILIES
 from auv_analysis.metrics.summary import BAND_TEXT, DWELL, band_of
 from auv_analysis.output.arrow import pa
 from auv_analysis.report import plots
@@ -24,16 +23,6 @@ ACROSS = 4  # panels in a row
 SMALLEST, LARGEST = 1e-3, 1e4  # of the axis, multiples of the band
 TIMES = 240  # columns of the rows of colours
 ENDS = f', unless that is in the last {DWELL} % of the time'
-SIX = {  # name of the figure -> family, title
-    'rms_errors': ('velocity_error.rms', 'Root mean square velocity errors'),
-    'late_errors': ('velocity_error.max_after_2s', 'Largest velocity errors after 2 s'),
-    'settling_times': ('velocity_error.settling_time', 'Settling times'),
-    'delta_xi': ('coupling.delta_xi_max', 'What inertial coupling adds to velocities, Δξ'),
-    'delta_pi': ('coupling.delta_pi_max', 'What inertial coupling adds to inputs, Δπ'),
-    'rms_inputs': ('effort.rms', 'Root mean square inputs'),
-    'peak_inputs': ('effort.max', 'Largest inputs'),
-}
-MARKS = 'pale 0: exactly zero; crossed out: there is none'
 
 
 def draw(
@@ -44,7 +33,6 @@ def draw(
         'ranking': partial(_ranking, ranking),
         'errors': partial(errors, entries),
         'kinetic_energy': partial(_energy, table),
-        **{name: partial(_six, name, table) for name in SIX},
     }
     return plots.save_figures(folder, drawn)
 
@@ -54,41 +42,14 @@ def column(table: pa.Table, name: str) -> np.ndarray:
     return np.array(table[name].to_pylist(), float)
 
 
-def six(table: pa.Table, family: str) -> np.ndarray:
-    """Columns of a family (n, 6), NaN where there is none."""
-    return np.stack([column(table, f'{family}.{dof}') for dof in DOFS], axis=1)
-
-
-def _six(name: str, table: pa.Table) -> Drawn:
-    family, title = SIX[name]
-    values, entry = six(table, family), FAMILIES[family]
-    halves = [slice(6)] if entry.units[0] == entry.units[1] else [slice(3), slice(3, 6)]
-    zeros = structural(table, family)
-    grids = [
-        HeatMap(values[:, half], DOFS[half], f'{entry.label} ({unit})', structural=zeros[:, half])
-        for half, unit in zip(halves, entry.units, strict=False)
-    ]
-    always = f', {plots.ALWAYS}: for every motion by the structure of M' if zeros.any() else ''
-    caption = f'{title}, a row per run ({entry.meaning}); {MARKS}{always}.'
-    return plots.heat_map(table['run'].to_pylist(), grids), title, caption
-
-
-def structural(table: pa.Table, family: str) -> np.ndarray:
-    """(n, 6) whether a figure of a family is zero for every motion, by the structure of M."""
-    kind = family.removeprefix('coupling.').removesuffix('_max')
-    if kind not in ('delta_xi', 'delta_pi'):
-        return np.zeros((len(table), 6), bool)
-    words = table[f'coupling.structural_zeros.{kind}'].to_pylist()
-    return np.array([[dof in (word or '').split('; ') for dof in DOFS] for word in words])
-
-
 def _energy(table: pa.Table) -> Drawn:
     """Shares of the mean kinetic energy as bars, and the energy beside them."""
-    names, shares = table['run'].to_pylist(), six(table, 'kinetic_energy.shares_percent')
+    names = table['run'].to_pylist()
+    columns = [column(table, f'kinetic_energy.shares_percent.{dof}') for dof in DOFS]
     figure = plots.new_figure(min(plots.MARGIN + plots.ROW * len(names), plots.TALLEST))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2, 1))
     places = np.arange(len(names))
-    known = np.nan_to_num(shares)
+    known = np.nan_to_num(np.stack(columns, axis=1))
     starts = np.cumsum(known, axis=1) - known
     for i in range(6):
         left.barh(places, known[:, i], left=starts[:, i], color=COLOURS[i], height=0.78)

@@ -14,11 +14,11 @@ from auv_analysis.output.new_files import write_json
 from auv_analysis.output.progress import each, say, waiting
 from auv_analysis.output.text import capital, join, number
 from auv_analysis.report.digest import digest
-from auv_analysis.report.document import Block, Section, Sentence, write_document
+from auv_analysis.report.document import Section, Sentence, write_document
 from auv_analysis.report.plots import FigureRecord
 from auv_analysis.report.results import Column, Table, described, make_table
 from auv_analysis.report.run_report import namesakes
-from auv_analysis.studies.compare.plots import SIX, draw
+from auv_analysis.studies.compare.plots import draw
 from auv_analysis.studies.compare.ranking import (
     CSV,
     ERRORS,
@@ -32,10 +32,13 @@ from auv_analysis.studies.compare.sources import RunSource, named, open_source
 from auv_dynamics.files.errors import FailedError, first_line, printable
 from auv_dynamics.vehicle import DOFS
 
-SECTIONS = {  # section -> its title, and the plots in it
-    'errors': ('Errors', ('rms_errors', 'late_errors', 'settling_times')),
-    'couplings': ('Couplings', ('delta_xi', 'delta_pi')),
-    'inputs': ('Inputs', ('rms_inputs', 'peak_inputs')),
+SECTIONS = {  # section -> its title, and the families of metrics in it
+    'errors': (
+        'Errors',
+        ('velocity_error.rms', 'velocity_error.max_after_2s', 'velocity_error.settling_time'),
+    ),
+    'couplings': ('Couplings', ('coupling.delta_xi_max', 'coupling.delta_pi_max')),
+    'inputs': ('Inputs', ('effort.rms', 'effort.max')),
 }
 NAMED = {
     'run': described('run'),
@@ -119,16 +122,14 @@ def write_comparison(
     figures: Mapping[str, FigureRecord],
 ) -> Path:
     """Write report.html of a comparison into an existing folder; returns its path."""
-    energy: list[Block] = [six_table(table, SHARES), figures['kinetic_energy']]
     sections = [
         Section('overview', 'All runs', [overview(table), figures['ranking'], figures['errors']]),
-        Section('energy', 'Kinetic energy', energy),
+        Section('energy', 'Kinetic energy', [six_table(table, SHARES), figures['kinetic_energy']]),
+        *(
+            Section(name, title, [six_table(table, family) for family in families])
+            for name, (title, families) in SECTIONS.items()
+        ),
     ]
-    for name, (title, members) in SECTIONS.items():
-        blocks: list[Block] = []
-        for member in members:
-            blocks += [six_table(table, SIX[member][0]), figures[member]]
-        sections.append(Section(name, title, blocks))
     about = (
         f'{len(entries)} runs of {_counted(entries, "scenario")} on '
         f'{_counted(entries, "vehicle")}. '
@@ -148,24 +149,19 @@ def _counted(entries: Sequence[Entry], name: str) -> str:
 def overview(table: pa.Table) -> Table:
     """The table with a row per run: who it is, and every measure that sums it up."""
     measures = {m.name: described(m.label, m.meaning, m.unit) for m in MEASURES}
-    shown = NAMED | measures | _six_columns(SHARES, 'share of kinetic energy')
-    failed = [row['run'] for row in table.to_pylist() if row['failure']]
-    note = f'Failed, without metrics: {join(failed)}.' if failed else ''
     caption = 'All runs. Click on a head to sort by it.'
-    return make_table('runs', caption, table, shown, file=TABLE, note=note)
+    return make_table('runs', caption, table, NAMED | measures, file=TABLE)
 
 
 def six_table(table: pa.Table, family: str) -> Table:
     """A row per run, a column per degree of freedom."""
     meaning = FAMILIES[family].meaning
     caption, name = f'{capital(meaning)}.', family.replace('.', '_')
-    shown = {'run': NAMED['run']} | _six_columns(family)
+    shown = {'run': NAMED['run']}
+    for dof in DOFS:
+        column = f'{family}.{dof}'
+        shown[column] = Column(replace(quantity(column), label=dof))
     return make_table(name, caption, table, shown, file=TABLE)
-
-
-def _six_columns(family: str, group: str = '') -> dict[str, Any]:
-    names = {dof: f'{family}.{dof}' for dof in DOFS}
-    return {name: Column(replace(quantity(name), label=dof), group) for dof, name in names.items()}
 
 
 def findings(entries: Sequence[Entry], rows: Rows) -> list[Sentence]:

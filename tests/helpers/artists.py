@@ -198,7 +198,7 @@ def cells(axes: Axes, rows: Axes | None = None) -> dict[tuple[str, str], float]:
     found = {}
     for (i, j), value in np.ndenumerate(values):
         word = words.get((i, j), '')
-        nothing = word in ('0', '0.0', plots.ALWAYS) and np.isnan(value)
+        nothing = word in ('0', '0.0') and np.isnan(value)
         found[down[i], across[j]] = 0.0 if nothing else value
         if word and not nothing:
             shown, half = _number(word)

@@ -44,7 +44,7 @@ def test_the_atlas_is_drawn(tmp_path: Path) -> None:
     ended = auv('atlas', 'bluerov2', '--only', '--json', cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr
     assert list(json.loads(ended.stdout)['vehicles']) == ['bluerov2']
-    figures = {'strength', 'correlation', 'shares', 'case1_delta_xi', 'case1_delta_pi'}
+    figures = {'strength', 'correlation', 'shares'}
     assert drawn(tmp_path / 'runs/atlas') == figures
     assert 'Warning' not in ended.stderr
 

@@ -7,7 +7,7 @@ from PIL import Image
 
 from auv_analysis.output.text import number, typeset
 from auv_analysis.report import plots
-from auv_analysis.report.plots import ALWAYS, HeatMap, draw_grid, heat_map
+from auv_analysis.report.plots import HeatMap, draw_grid, heat_map
 
 pytestmark = pytest.mark.usefixtures('approved')
 
@@ -31,13 +31,9 @@ def test_scale_is_logarithmic_only_where_it_has_to_be() -> None:
     assert HeatMap(np.array([[np.nan]]), ('a',), '').norm().vmax == 1.0
 
 
-def test_cells_say_zero_always_zero_and_nothing() -> None:
-    values, always = (
-        np.array([[0.0, 0.0, np.nan, 1.25e-7]]),
-        np.array([[False, True, False, False]]),
-    )
-    grid = HeatMap(values, 'abcd', '', structural=always)
-    assert texts(grid) == ['0', ALWAYS, r'$1.2\cdot10^{-7}$']
+def test_cells_say_zero_and_nothing() -> None:
+    grid = HeatMap(np.array([[0.0, np.nan, 1.25e-7]]), 'abc', '')
+    assert texts(grid) == ['0', r'$1.2\cdot10^{-7}$']
     rounded = HeatMap(np.array([[-0.04, 2.26, 0.0, -1.0]]), 'abcd', '', decimals=1)
     assert texts(rounded) == ['0.0', '2.3', '0', '−1.0']
 

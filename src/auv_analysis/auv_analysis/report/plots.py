@@ -50,7 +50,6 @@ ROW, MARGIN = 0.21, 0.85  # in
 DECADES = 4.0  # that a logarithmic scale spans at most
 APART = 20.0  # ratio of the extremes from which a scale is logarithmic
 BLANK = '#f2f2f2'
-ALWAYS = '≡ 0'  # zero for every motion
 RUNS = (  # of three runs and more
     '#1a1a1a', '#D55E00', '#0072B2', '#009E73', '#CC79A7', '#E69F00', COLOURS[-1], '#8c8c8c',
 )  # fmt: skip
@@ -381,7 +380,6 @@ class HeatMap:
     colours : name of a colour map
     scale : of the colours; None: from the values
     decimals : of the numbers in the cells; None: two significant digits
-    structural : (r, c) whether a zero follows from the structure of M; None: not known
 
     """
 
@@ -391,7 +389,6 @@ class HeatMap:
     colours: str = 'cividis_r'
     scale: Normalize | None = None
     decimals: int | None = None
-    structural: np.ndarray | None = None
 
     def norm(self) -> Normalize:
         """Scale of the colours: logarithmic where positive values are far apart."""
@@ -475,9 +472,7 @@ def draw_grid(axes: Axes, grid: HeatMap, *, fontsize: float = 7.0) -> None:
         shades = colours(norm(hidden))
         for (i, j), value in np.ndenumerate(values):
             if np.isfinite(value):
-                always = grid.structural is not None and grid.structural[i, j]
-                text = ALWAYS if always else _text(value, grid)
-                axes.text(j, i, text, ha='center', va='center', fontsize=fontsize,
+                axes.text(j, i, _text(value, grid), ha='center', va='center', fontsize=fontsize,
                           color=GREY if value == 0 else _ink(shades[i, j]))  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Figures of the atlas: a panel of 6x6 cells per vehicle, a ranking, what case 1 reaches."""
+"""Figures of the atlas: a panel of 6x6 cells per vehicle, a ranking."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -8,17 +8,14 @@ import numpy as np
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from auv_analysis.metrics.quantities import VELOCITY, WRENCH
 from auv_analysis.output.text import Maths, join
 from auv_analysis.report import plots
 from auv_analysis.report.plots import (
-    ALWAYS,
     COLOURS,
     Drawn,
     FigureRecord,
     HeatMap,
     draw_grid,
-    heat_map,
     save_figures,
     scale_bar,
 )
@@ -27,7 +24,6 @@ from auv_dynamics.vehicle import DOFS
 
 ACROSS = 2  # panels in a row
 SMALLEST_SHARE = 0.001  # %, low end of the scale
-KINDS = {'delta_xi': ('Δξ', VELOCITY), 'delta_pi': ('Δπ', WRENCH)}
 
 
 def draw(charts: Sequence[Chart], folder: Path) -> dict[str, FigureRecord]:
@@ -36,8 +32,6 @@ def draw(charts: Sequence[Chart], folder: Path) -> dict[str, FigureRecord]:
         'strength': lambda: _strength(charts),
         'correlation': lambda: _correlation(charts),
         'shares': lambda: _shares(charts),
-        'case1_delta_xi': lambda: _reached(charts, 'delta_xi'),
-        'case1_delta_pi': lambda: _reached(charts, 'delta_pi'),
     }
     return save_figures(folder, drawn)
 
@@ -149,25 +143,3 @@ def _strength(charts: Sequence[Chart]) -> Drawn:
         'the kinetic energy without them; dots, the same of the pair that is named.'
     )
     return figure, title, caption + uncoupled(charts)
-
-
-def _reached(charts: Sequence[Chart], kind: str) -> Drawn:
-    """Peaks of case 1 scaled to each vehicle, of those that are coupled and did not diverge."""
-    shown = [c for c in charts if not c.is_diagonal and not c.reached['failure']]
-    symbol, units = KINDS[kind]
-    title = f'{symbol} reached in case 1'
-    if not shown:
-        return None, title, f'{title}:{uncoupled(charts)}'
-    values = np.array([chart.reached[f'{kind}_max'] for chart in shown])
-    always = np.array([[dof in c.zeros[kind] for dof in DOFS] for c in shown])
-    halves = slice(0, 3), slice(3, 6)
-    grids = [
-        HeatMap(values[:, half], DOFS[half], f'{symbol} ({unit})', structural=always[:, half])
-        for half, unit in zip(halves, units, strict=True)
-    ]
-    caption = (
-        f'{title}, scaled to each vehicle, under GVC: the largest magnitude of the run; {ALWAYS}: '
-        'zero for every motion by the structure of M.'
-    )
-    names = [chart.name for chart in shown]
-    return heat_map(names, grids), title, caption + uncoupled(charts)

@@ -6,16 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.metrics.quantities import VELOCITY
+from auv_analysis.metrics.quantities import VELOCITY, WRENCH
 from auv_analysis.output.text import Maths, join, number
 from auv_analysis.report.document import Section, Sentence, write_document
 from auv_analysis.report.plots import FigureRecord
 from auv_analysis.report.results import Results, Shown, Table, described, document_table
 from auv_analysis.studies.atlas.atlas import Chart, results_of
-from auv_analysis.studies.atlas.plots import KINDS, uncoupled
+from auv_analysis.studies.atlas.plots import uncoupled
 from auv_dynamics.vehicle import DOFS
 
 PERCENT = 100.0
+KINDS = {'delta_xi': ('Δξ', VELOCITY), 'delta_pi': ('Δπ', WRENCH)}
 MEASURE = Maths(
     'With D = diag(M), the kinetic energy is 1/2 ν^T M ν = 1/2 y^T R y with y = D^1/2 ν and the '
     'inertial correlation R = D^-1/2 M D^-1/2. R is 1 on its diagonal; what is beside it are cross '
@@ -42,10 +43,7 @@ def write_report(out: Path, charts: Sequence[Chart], figures: Mapping[str, Figur
         Section('structure', 'Which deforms which', [
             SHARES, figures['shares'], pairs(results, charts),
         ]),
-        Section('case1', 'What case 1 reaches', [
-            block for kind in KINDS
-            for block in (reached(results, charts, kind), figures[f'case1_{kind}'])
-        ]),
+        Section('case1', 'What case 1 reaches', [reached(results, charts, kind) for kind in KINDS]),
     ]  # fmt: skip
     title = 'Coupling atlas'
     names = join([chart.name for chart in charts])

@@ -139,7 +139,7 @@ def _examine(
         section, gains = sensitivity_section(out, list(found.values()))
         more['tracking'] = [section]
         said = [*gains[:1], *said]
-    step_6 = Section('discussion', 'Step 6: discussion', discussion(summaries, leading))
+    step_6 = Section('discussion', 'Step 6: discussion', discussion(leading, summaries[leading]))
     more['couplings'] = [step_6]
     return {'more': more, 'sentences': said, 'claims': judged.claims if judged else None}
 

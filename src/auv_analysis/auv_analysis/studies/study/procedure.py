@@ -309,44 +309,22 @@ DEFORMED = {  # kind of coupling -> what is deformed by what, its own metric, un
 }
 
 
-def discussion(summaries: Mapping[str, Summary], leading: str) -> list[Sentence]:
-    """Step 6: sentences on convergence, energy and deformation, in this order.
+def discussion(name: str, summary: Summary) -> list[Sentence]:
+    """Step 6: sentences on the energy and the deformation of a run, in this order.
 
     Parameters
     ----------
-    summaries : name -> `summarize(run)`, of one scenario
-    leading : the run whose energy and couplings are discussed
+    name, summary : of the run, and its `summarize(run)`
 
     Returns
     -------
     sentences : only those that the numbers carry
 
     """
-    mine = summaries[leading]
-    found = [sentence for name, summary in summaries.items() for sentence in _pace(name, summary)]
-    found += _energy(leading, mine)
-    for kind in ('delta_xi', 'delta_pi'):
-        found += _deformed(kind, mine)
+    found = [*_energy(name, summary)]
+    for kind in DEFORMED:
+        found += _deformed(kind, summary)
     return found
-
-
-def _pace(name: str, summary: Summary) -> Iterator[Sentence]:
-    """Velocities that converge slowly, or not at all."""
-    times = summary['velocity_error']['settling_time']
-    never = [dof for dof, time in zip(DOFS, times, strict=True) if time is None]
-    rest = [(time, dof) for dof, time in zip(DOFS, times, strict=True) if time]
-    text = ''
-    if never:
-        text = f'Under {name}, {join(never)} {"does" if len(never) == 1 else "do"} not settle '
-        text += f'within {summary["duration"]:g} s'
-        text += (
-            f'; of the others {max(rest)[1]} is last, after {max(rest)[0]:.2f} s' if rest else ''
-        )
-    elif rest:
-        text = f'Under {name}, {max(rest)[1]} settles last, after {max(rest)[0]:.2f} s'
-    else:
-        text = f'Under {name} no error ever leaves the band within which it counts as settled'
-    yield Sentence(f'{text}.', 'table-key_figures')
 
 
 def _energy(name: str, summary: Summary) -> Iterator[Sentence]:

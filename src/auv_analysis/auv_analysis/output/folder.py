@@ -56,6 +56,12 @@ def sha256_of(path: Path) -> str:
         return hashlib.file_digest(file, 'sha256').hexdigest()
 
 
+def changed_in(folder: Path, names: Iterable[str]) -> Iterator[str]:
+    """Those of some files in a folder that are not what its manifest lists."""
+    listed = listed_in(folder) or {}
+    return (n for n in names if n in listed and sha256_of(folder / n) != listed[n])
+
+
 def signature(path: Path) -> Signature:
     """Fingerprint of a file, taken without reading it."""
     found = path.lstat()

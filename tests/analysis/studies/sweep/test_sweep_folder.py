@@ -99,6 +99,13 @@ def test_what_a_killed_sweep_has_finished_is_listed(files: Path) -> None:
     assert len(parts(files / 'killed')) == len(parts(files / 'other')) + 1  # and what is half
 
 
+def test_what_is_killed_before_its_first_block_may_be_replaced(files: Path) -> None:
+    campaign = load_campaign(files / 'campaign.yaml')
+    with sweep_folder(files / 'out', campaign, overwrite=False) as folder:
+        shutil.copytree(folder.folder, files / 'killed')
+    assert run(files, out='killed', overwrite=True).rollouts == ROLLOUTS
+
+
 def test_a_sweep_does_not_go_on_with_another_set_point(files: Path) -> None:
     way = 't,surge,sway,heave,roll,pitch,yaw\n0,0,0,0,0,0,0\n1,0.5,0,0.2,0,0,0\n'
     (files / 'way.csv').write_text(way)

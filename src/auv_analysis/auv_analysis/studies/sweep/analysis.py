@@ -10,7 +10,7 @@ import numpy as np
 
 from auv_analysis.metrics.measures import BY_NAME, FAMILIES, MEASURES, Measure
 from auv_analysis.metrics.quantities import quantity
-from auv_analysis.output.folder import ROLLOUTS, listed_in, sha256_of
+from auv_analysis.output.folder import ROLLOUTS, changed_in
 from auv_analysis.output.new_files import known
 from auv_analysis.output.progress import each
 from auv_analysis.output.text import join
@@ -305,7 +305,10 @@ def analysed(sweep: Sweep, by: str = BEST_BY) -> Analysis:
     analysis = Analysis(sweep, factors_of(sweep), {name: [] for name in TABLES})
     groups, notes = designed(sweep)
     analysis.notes = [
-        *_changed(sweep),
+        *(
+            f'{sweep.folder / name}: not as it was written: its figures may be others'
+            for name in changed_in(sweep.folder, [f'{ROLLOUTS}/{p.name}' for p in sweep.parts])
+        ),
         *notes,
         *_tied(sweep),
         *(n for group in groups for n in reached(sweep, group)),
@@ -329,15 +332,6 @@ def analysed(sweep: Sweep, by: str = BEST_BY) -> Analysis:
     analysis.tables['failures'] = [*failures(analysis)]
     analysis.tables['best'] = best(analysis, BY_NAME[by])
     return analysis
-
-
-def _changed(sweep: Sweep) -> Iterator[str]:
-    """Parts that are not what the manifest lists."""
-    listed = listed_in(sweep.folder) or {}
-    for path in sweep.parts:
-        found = sha256_of(path)
-        if listed.get(f'{ROLLOUTS}/{path.name}', found) != found:
-            yield f'{path}: not as it was written: its figures may be others'
 
 
 def _tied(sweep: Sweep) -> Iterator[str]:

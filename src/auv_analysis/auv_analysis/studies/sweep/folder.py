@@ -23,6 +23,7 @@ from auv_analysis.output.folder import (
     ROLLOUTS,
     SWEEP,
     ResultsFolder,
+    changed_in,
     listed_in,
     results_folder,
     sha256_of,
@@ -95,15 +96,10 @@ class SweepFolder:
         self._digests.pop(MANIFEST, None)
         for name in (SWEEP, *_write_inputs(self.folder, campaign)):
             self._digests[name] = sha256_of(self.folder / name)
-        self._drop_changed()
-
-    def _drop_changed(self) -> None:
-        """Remove parts that are no more what was written: they are made again."""
-        for _, path in sorted(self._parts()):
-            found = sha256_of(path)
-            if self._digests.setdefault(_name(path), found) != found:
-                say(f'warning: {path}: not as it was written: made again')
-                path.unlink()
+        for name in changed_in(self.folder, [_name(part) for _, part in sorted(self._parts())]):
+            say(f'warning: {self.folder / name}: not as it was written: made again')
+            (self.folder / name).unlink()
+        write_manifest(self.folder, self._digests)  # a kill may come before the first block
 
     def finished(self, columns: list[str]) -> Iterator[tuple[int, 'pa.Table']]:
         """Number and some columns of each finished block; what cannot be read is not finished."""

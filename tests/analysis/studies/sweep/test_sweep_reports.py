@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace as Made
 
 import numpy as np
 import pytest
@@ -67,6 +68,11 @@ def test_bins_are_joined_where_they_are_many(results: Analysis) -> None:
     assert labels[0].split('–')[0] == varied.labels[0].split('–')[0]
     assert labels[-1].split('–')[1] == varied.labels[-1].split('–')[1]
     assert codes.max() == len(labels) - 1
+    labels = [*(f'{k}–{k + 1}' for k in range(11)), '11']
+    twelve = Made(binned=True, codes=np.arange(12), labels=labels)
+    codes, labels = merged(twelve)
+    assert codes.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
+    assert labels == ['0–2', '2–4', '4–6', '6–8', '8–10', '10–11']
 
 
 @pytest.mark.parametrize(
@@ -226,6 +232,19 @@ vary:
         'what one explains may be the work of another'
     ]
     assert results.measures == []
+
+
+def test_paths_of_many_lists_have_no_table_of_two(tmp_path: Path) -> None:
+    lists = [[float(k)] * 6 for k in range(1, 22)]
+    paths = f'controllers.gvc.k_D: {lists}, controllers.gvc.k_I: {lists}'
+    text = f'name: lists\nscenario: case1\nvary: [{{zip: {{{paths}}}}}]'
+
+    def rising(controller, values, index):
+        return {ENERGY: index + 1.0}
+
+    results = analysed(open_sweep(make_sweep(tmp_path, text, rising)))
+    assert len(results.most_influential()) == 2
+    assert (results.pair, results.tables['together']) == ([], [])
 
 
 def test_few_rows_still_show_what_they_depend_on(tmp_path: Path) -> None:

@@ -39,7 +39,8 @@ from auv_analysis.studies.sweep.variation import kind_of
 from auv_dynamics.vehicle import DOFS
 
 FEWEST = 8  # rows that a correlation is worth computing of
-MOST_CELLS = 10  # groups of a path that a table of two has room for
+MOST_CELLS = 10  # bins of a path that a table of two has room for
+MOST_CHOICES = 20  # words or lists of one: of hundreds it has a hundred thousand cells
 COUNT = 10  # best rows of each controller
 
 
@@ -248,7 +249,7 @@ class Analysis:
     measures : those that differ between rows
     fixed : those that do not, with their value, None where there is none
     values : measure -> (n,) of all rows
-    pair : the two paths that matter most; none where there are fewer
+    pair : of the paths that a table of two has room for, the two that matter most
     notes : what is worth saying, one line each
     spreads : figure -> its rows of the table `quantiles`
     ranks : path, controller -> ranks of its numbers in the finished rows; None of words and lists
@@ -327,7 +328,8 @@ def analysed(sweep: Sweep, by: str = BEST_BY) -> Analysis:
         f'{family}.{dof}' for family in FAMILIES for dof in DOFS
     ]
     analysis.tables['quantiles'] = [row for name in figures for row in analysis.spreads[name]]
-    analysis.pair = analysis.most_influential()[:2]
+    few = (f for f in analysis.most_influential() if f.binned or len(f.labels) <= MOST_CHOICES)
+    analysis.pair = [*few][:2]
     analysis.tables['together'] = [*together(analysis)]
     analysis.tables['failures'] = [*failures(analysis)]
     analysis.tables['best'] = best(analysis, BY_NAME[by])

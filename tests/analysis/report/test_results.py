@@ -154,7 +154,7 @@ def test_a_table_of_a_document_points_into_it() -> None:
 
 
 def test_a_view_of_a_file_points_to_the_rows_it_shows() -> None:
-    table = view_of_file('t', 'T.', [{'x': 1.5}, {'x': 2.5}], {'x': 'x'}, 'f.parquet', [7, 3])
+    table = view_of_file('t', 'T.', [(7, {'x': 1.5}), (3, {'x': 2.5})], {'x': 'x'}, 'f.parquet')
     assert (table.name, table.caption) == ('t', 'T.')
     assert [row['source'] for row in numbers_of([table])] == ['f.parquet:x[7]', 'f.parquet:x[3]']
 

@@ -180,8 +180,7 @@ def fault_tables(found: Mapping[str, Sequence[FaultResponse]]) -> Iterator[Table
         mine = [(i, row) for i, row in stored if row['fault'] == index]
         mine.sort(key=lambda pair: DOFS.index(pair[1]['dof']))
         caption = f'Fault {index}: {first.mark.label}, {first.mark.times}. {_times(first)}'
-        places, rows = zip(*mine, strict=True)
-        yield view_of_file(f'faults_{index}', caption, rows, SHOWN, FILE, places, stub=2)
+        yield view_of_file(f'faults_{index}', caption, mine, SHOWN, FILE, stub=2)
 
 
 def _times(response: FaultResponse) -> str:

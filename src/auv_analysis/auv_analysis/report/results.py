@@ -342,14 +342,15 @@ def terminal(table: Table, *, title: bool = False) -> rich_table.Table:
 def view_of_file(
     name: str,
     caption: str,
-    rows: Rows,
+    numbered: Iterable[tuple[int, Mapping[str, Any]]],
     shown: Mapping[str, Shown],
-    file: str,
-    places: Sequence[int],
+    file: str = '',
     **about: Any,
 ) -> Table:
-    """Table of some rows of a Parquet file, which stand at these places in it."""
-    pointer = lambda row, column: f'{file}:{column}[{places[row]}]'  # noqa: E731
+    """Table of some rows of a Parquet file, each behind its place there; default: of its name."""
+    places, rows = zip(*numbered, strict=True)
+    where = file or f'{name}.parquet'
+    pointer = lambda row, column: f'{where}:{column}[{places[row]}]'  # noqa: E731
     return make_table(name, caption, rows, shown, pointer=pointer, **about)
 
 

@@ -162,7 +162,7 @@ def test_loops_that_always_diverge_are_a_refusal_with_its_reason(monkeypatch, tm
     assert (own.rollouts, found.rollouts) == (0, 0)
     assert (own.failed, own.span) == ({}, 2.0)
     assert found.span == pytest.approx(2.0**0.125)  # the last that was tried
-    table = left_out_table([own])
+    (table,) = left_out_table([own])
     assert own.refusal in [cell.text for row in table.rows for cell in row]
     path = write_sensitivities(tmp_path, [own, found])
     assert set(parquet.read_table(path)['reason'].to_pylist()) == {own.refusal, found.refusal}
@@ -270,7 +270,7 @@ def test_table_sentences_and_file_say_the_same(monkeypatch, tmp_path, approved):
     known(monkeypatch, **LAWS)
     found = sensitivity(short(), 'gvc', count=64)
     sway = found.of('velocity_error.rms')['sway'][0]
-    table = sensitivity_table([found], 'gvc')
+    table = sensitivity_table([found], found)
     assert [row[0].text for row in table.rows] == ['RMS error, sway', 'RMS error, surge']
     assert table.rows[0][3].value == sway['spread']
     rows = parquet.read_table(write_sensitivities(tmp_path, [found])).to_pylist()
@@ -296,7 +296,7 @@ def test_gains_may_be_called_as_columns_of_the_table(monkeypatch):
     called = dict(zip(found.gains, ('gain', 'value', 'rank', 'kpi'), strict=True))
     rows = tuple(row | {'gain': called[row['gain']]} for row in found.rows)
     own = replace(found, gains=(*called.values(),), rows=rows)
-    tables = [sensitivity_table([one], 'gvc') for one in (found, own)]
+    tables = [sensitivity_table([one], one) for one in (found, own)]
     cells = [[[(c.value, c.source) for c in row] for row in table.rows] for table in tables]
     assert cells[0] == cells[1]
 

@@ -64,19 +64,19 @@ def test_the_measure_that_follows_the_gains_most_in_words() -> None:
     main = {'alike': 6, 'rank_high': 1, 'rank_low': 1, 'doubled': -58.0, 'gain': 'k_D', 'ST': 0.7,
             'spread': 1.25}  # fmt: skip
     found = Made(controller='cl', method='sobol')
-    assert study._headline(found, 'velocity_error.rms', 'sway', main) == (
+    assert study._headline(found, 'sway', main) == (
         'Under cl the RMS error that follows the gains most is that of sway (spread 1.2, first of '
         '6 in 95 % of the resamplings): k_D makes 70 % of its variance, and doubling k_D changes '
         'it by about −58 %.'
     )
     for doubled, words in ((0.5, '+0.50'), (0.0, '+0')):
         main |= {'doubled': doubled, 'ST': 1.04}  # estimated, as a share of the whole
-        text = study._headline(found, 'velocity_error.rms', 'sway', main)
+        text = study._headline(found, 'sway', main)
         assert text.endswith(f'about {words} %.')
         assert ': k_D makes 100 % of its variance' in text
     main |= {'rank_high': 3, 'rank_low': 2, 'doubled': 12.0}
     found.method = 'morris'
-    assert study._headline(found, 'velocity_error.rms', 'sway', main).endswith(
+    assert study._headline(found, 'sway', main).endswith(
         '(spread 1.2, place 2 to 3 of 6): doubling k_D changes it by about +12 %.'
     )
 

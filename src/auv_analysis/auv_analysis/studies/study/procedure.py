@@ -89,14 +89,10 @@ def _stored(of: Sensitivity) -> Iterator[Row]:
         yield words | numbers | about | {'reason': row.get('reason', '')}
 
 
-def sensitivity_table(found: Sequence[Sensitivity], controller: str) -> Table:
-    """Every KPI of a controller without a refusal by falling spread, with the gains that move it.
-
-    `found` are all controllers, as in the file.
-    """
-    stored = enumerate(row for of in found for row in _stored(of))
+def sensitivity_table(found: Sequence[Sensitivity], of: Sensitivity) -> Table:
+    """KPIs of one of them, without a refusal, by falling spread, with the gains that move each."""
+    stored = enumerate(row for one in found for row in _stored(one))
     place = {(r['controller'], r['figure'], r['dof'], r['gain']): i for i, r in stored}
-    of = next(of for of in found if of.controller == controller)
     group, meaning = WEIGHTS[of.method]
     rows = [
         {'kpi': kpi.quantity.label, **mine[0]}
@@ -109,23 +105,23 @@ def sensitivity_table(found: Sequence[Sensitivity], controller: str) -> Table:
         gain, name = row['gain'], column
         if column.startswith(OF_GAIN):
             gain, name = column.removeprefix(OF_GAIN), of.weight
-        return f'{FILE}:{name}[{place[controller, row["figure"], row["dof"], gain]}]'
+        return f'{FILE}:{name}[{place[of.controller, row["figure"], row["dof"], gain]}]'
 
     gains: dict[str, Shown] = {
         f'{OF_GAIN}{gain}': described(symbol(gain), meaning, group=group, decimals=2)
         for gain in of.gains
     }
     caption = (
-        f'How the KPIs of {controller} change when every gain is multiplied by a number '
+        f'How the KPIs of {of.controller} change when every gain is multiplied by a number '
         f'of its own between 1/{plain(of.span)} and {plain(of.span)} (log-uniform): '
         f'{of.rollouts} runs, indices after {METHODS[of.method]}.'
     )
-    name = f'sensitivity_{controller}'
+    name = f'sensitivity_{of.controller}'
     return make_table(name, caption, rows, HEADS | gains, pointer=pointer, folded=True)
 
 
-def left_out_table(found: Sequence[Sensitivity]) -> Table | None:
-    """KPIs and gains that have no indices, and why; None where there are none."""
+def left_out_table(found: Sequence[Sensitivity]) -> Iterator[Table]:
+    """KPIs and gains that have no indices, and why; no table where there are none."""
     heads = ('controller', 'what', 'why')
     rows = [
         dict(zip(heads, (of.controller, *entry), strict=True))
@@ -134,8 +130,9 @@ def left_out_table(found: Sequence[Sensitivity]) -> Table | None:
     ]
     caption = 'What is left out of the study of gains: its logarithm does not exist or never moves.'
     shown = {name: name for name in heads}
-    name = 'sensitivity_left_out'
-    return make_table(name, caption, rows, shown, stub=2, folded=True) if rows else None
+    if rows:
+        name = 'sensitivity_left_out'
+        yield make_table(name, caption, rows, shown, stub=2, folded=True)
 
 
 def _left_out(of: Sensitivity) -> Iterator[tuple[str, str]]:
@@ -165,11 +162,11 @@ def _sentences(of: Sensitivity) -> Iterator[tuple[str, str]]:
             table,
         )
     for dof, rows in [*of.of(HEADLINE).items()][:1]:
-        yield _headline(of, HEADLINE, dof, rows[0]), table
+        yield _headline(of, dof, rows[0]), table
 
 
-def _headline(of: Sensitivity, name: str, dof: str, main: Row) -> str:
-    """The KPI of a kind that follows the gains most, by the row of the gain that does most."""
+def _headline(of: Sensitivity, dof: str, main: Row) -> str:
+    """The error that follows the gains most, by the row of the gain that does most."""
     sure = (
         f'first of {main["alike"]} in 95 % of the resamplings'
         if main['rank_high'] == 1
@@ -180,8 +177,8 @@ def _headline(of: Sensitivity, name: str, dof: str, main: Row) -> str:
     if of.method == 'sobol':
         share = f'{gain} makes {number(min(100 * main["ST"], 100), 2)} % of its variance, and '
     return (
-        f'Under {of.controller} the {quantity(name).label} that follows the gains most is that of '
-        f'{dof} (spread {number(main["spread"], 2)}, {sure}): '
+        f'Under {of.controller} the {quantity(HEADLINE).label} that follows the gains most is that '
+        f'of {dof} (spread {number(main["spread"], 2)}, {sure}): '
         f'{share}doubling {gain} changes it by about {sign}{number(abs(main["doubled"]), 2)} %.'
     )
 
@@ -237,7 +234,6 @@ def _bars(axes: Axes, shown: Mapping[Kpi, Sequence[Row]]) -> None:
     axes.set_xlabel('standard deviation of ln(KPI)')
 
 
-Part = tuple[Section, list[Sentence]]
 GAINS = (
     'Every gain is multiplied by a number of its own, drawn log-uniformly; each KPI of the run '
     'is taken by its logarithm, so that its standard deviation is about a relative change. '
@@ -246,21 +242,15 @@ GAINS = (
 )
 
 
-def sensitivity_section(out: Path, found: Sequence[Sensitivity]) -> Part:
+def sensitivity_section(out: Path, found: Sequence[Sensitivity]) -> tuple[Section, list[Sentence]]:
     """Section on the gains, and what the summary says; writes `sensitivity.parquet` and figures."""
     write_sensitivities(out, found)
     sentences = sensitivity_sentences(found)
-    blocks = [GAINS, *sentences, *_of_controllers(out, found)]
-    return Section('sensitivity', 'Step 3: what a change of the gains does', blocks), sentences
-
-
-def _of_controllers(out: Path, found: Sequence[Sensitivity]) -> Iterator[Block]:
     known = [of for of in found if not of.refusal]
-    yield from sensitivity_plots(known, out / 'figures')
-    yield from (sensitivity_table(found, of.controller) for of in known)
-    left_out = left_out_table(found)
-    if left_out is not None:
-        yield left_out
+    blocks: list[Block] = [GAINS, *sentences, *sensitivity_plots(known, out / 'figures')]
+    blocks += (sensitivity_table(found, of) for of in known)
+    blocks += left_out_table(found)
+    return Section('sensitivity', 'Step 3: what a change of the gains does', blocks), sentences
 
 
 def write_samples(run: Run, path: Path) -> Path:

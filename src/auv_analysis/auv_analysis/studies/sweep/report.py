@@ -192,8 +192,9 @@ def write_report(out: Path, analysis: Analysis, figures: Mapping[str, FigureReco
         Section('distributions', 'Distributions', [
             *shown('distributions'), *([_spreads(analysis)] if analysis.measures else [])]),
         Section('controllers', 'Controllers against each other',
-                [_view('paired', 'Controllers against each other in the same rollouts.',
-                       enumerate(tables['paired']), PAIRED, stub=3)] if tables['paired'] else []),
+                [view_of_file('paired', 'Controllers against each other in the same rollouts.',
+                              enumerate(tables['paired']), PAIRED, stub=3)]
+                if tables['paired'] else []),
         Section('influence', 'What matters', [
             *shown('influence'), *([_influences(analysis)] if tables['influence'] else []),
             *shown('total_indices', 'elementary_effects'), *_indices(analysis)]),
@@ -217,14 +218,6 @@ def _listings(folder: Path) -> list[tuple[str, str]]:
 
 
 # tables: views of the rows that are stored
-
-
-def _view(
-    name: str, caption: str, numbered: Any, shown: Shown, file: str = '', **about: Any
-) -> Table:
-    """Some numbered rows of a Parquet file, of the table's name unless another is told."""
-    places, rows = zip(*numbered, strict=True)
-    return view_of_file(name, caption, rows, shown, f'{file or name}.parquet', places, **about)
 
 
 def _of_document(name: str, key: str, caption: str, rows: Sequence[Row], **about: Any) -> Table:
@@ -267,7 +260,7 @@ def _spreads(analysis: Analysis) -> Table:
     rows = [(i, row) for i, row in numbered if row['figure'] in measures]
     caption = 'Distribution of the measures over the rollouts. Every column: quantiles.parquet.'
     note = 'An en dash: more rows than that have no such value, such as a time to settle.'
-    return _view('quantiles', caption, rows, SPREADS, stub=2, note=note)
+    return view_of_file('quantiles', caption, rows, SPREADS, stub=2, note=note)
 
 
 def _influences(analysis: Analysis) -> Table:
@@ -277,7 +270,7 @@ def _influences(analysis: Analysis) -> Table:
         key=lambda e: (order[e[1]['figure']], e[1]['controller'], -e[1]['explained_percent']),
     )
     rows = [(i, _named(analysis, row)) for i, row in numbered]
-    return _view('influence', 'What matters for which measure.', rows, INFLUENCE, stub=3)
+    return view_of_file('influence', 'What matters for which measure.', rows, INFLUENCE, stub=3)
 
 
 def _indices(analysis: Analysis) -> Iterator[Table]:
@@ -296,7 +289,7 @@ def _indices(analysis: Analysis) -> Iterator[Table]:
         if rows:
             told = {key: head for key, head in INDEX.items() if any(row[key] for _, row in rows)}
             shown = told | POINTS | heads
-            yield _view(name, caption, rows, shown, 'indices', stub=len(told))
+            yield view_of_file(name, caption, rows, shown, 'indices.parquet', stub=len(told))
 
 
 def _best(analysis: Analysis) -> Table:
@@ -310,7 +303,7 @@ def _best(analysis: Analysis) -> Table:
               for m in analysis.measures}  # fmt: skip
     (by,) = {row['by'] for row in rows}
     caption = f'Rollouts with the smallest {BY_NAME[by].label}, of each controller.'
-    return _view('best', caption, enumerate(rows), shown)
+    return view_of_file('best', caption, enumerate(rows), shown)
 
 
 def _failures(analysis: Analysis) -> Iterator[Table]:
@@ -326,7 +319,7 @@ def _failures(analysis: Analysis) -> Iterator[Table]:
     note = f'{others} in failures.parquet.' if left > 0 else ''
     if rows:
         caption = 'Values at which most rows fail.'
-        yield _view('failures', caption, rows[:MOST_FAILURES], FAILURES, stub=3, note=note)
+        yield view_of_file('failures', caption, rows[:MOST_FAILURES], FAILURES, stub=3, note=note)
     if reasons := analysis.reasons():
         heads: Shown = {key: key for key in ('status', 'reason', 'rows')}
         caption = 'The commonest reasons.'

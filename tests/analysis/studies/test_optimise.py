@@ -53,3 +53,26 @@ def test_a_descent_ends_with_its_gradients(gradients):
     search = Search(lambda x: (x**4).sum(1)[None], LOW, HIGH, tolerance=1e-16)
     search.run(np.array([[2.0, -1.0]]), ((1, gradients),))
     assert (search.evaluations()[2] == GRADIENT).sum() == gradients * 4
+
+
+def test_what_violates_a_constraint_is_added_to_the_objective():
+    search = Search(lambda x: x.T, LOW, HIGH, ('eq', 'ineq'))
+    values = np.array([[1.0, 1.0, 1.0, 1.0], [0.0, -2.0, 0.5, 0.0], [0.0, 3.0, -1.0, -0.5]])
+    assert_allclose(search.merit(values, 10.0), [1.0, 21.0, 16.0, 6.0])
+    assert_allclose(Search(lambda x: x.T, LOW, HIGH).merit(values[:1], 10.0), 1.0)
+
+
+def test_of_starts_next_to_each_other_the_best_is_taken():
+    search = Search(lambda x: x.T, LOW, HIGH, apart=0.1)  # 0.6 in each coordinate
+    x = np.array([[2.0, 2.0], [0.5, 0.7], [0.5, 0.5], [0.0, 0.0]])
+    assert search._chosen(x, np.array([4.0, 3.0, 2.0, 1.0]), 3) == [3, 1, 0]
+    assert search._chosen(x, np.array([4.0, 3.0, 2.0, 1.0]), 2) == [3, 1]
+    assert search._chosen(x, np.array([1.0, 2.0, 2.0, 2.0]), 9) == [0, 1, 3], 'the first of equals'
+
+
+def test_a_point_of_a_gradient_is_not_taken_for_the_best():
+    search = Search(lambda x: x.T, np.zeros(1), np.ones(1))
+    search.evaluate(np.array([[0.5], [0.1], [0.7]]), ['refine', GRADIENT, 'global'])
+    assert search._best_since(0).tolist() == [0.5]
+    search.evaluate(np.array([[0.9]]), ['refine'])
+    assert search._best_since(1).tolist() == [0.9]

@@ -287,6 +287,20 @@ def test_the_unit_of_an_entry_is_that_of_its_velocities() -> None:
     ]  # fmt: skip
 
 
+def test_what_case_1_reaches_is_told_of_vehicles_that_come_to_its_end() -> None:
+    charts = [_chart('a', 0.5, [('sway', 'roll')]), _chart('b', 0.2, [('surge', 'pitch')], 'x')]
+    peaks = [0.5, 1.5, 2.5, 3.5, 4.5, 5.5]
+    case1 = {'delta_xi_max': peaks, 'delta_pi_max': peaks,
+             'delta_xi_energy_percent': [0.0, 7.0, 3.0, 0.0, 0.0, 0.0]}  # fmt: skip
+    charts[0].reached |= case1
+    results = Results('atlas', {'vehicles': {'a': {'case1': case1}}})
+    xi, pi = (atlas.reached(results, charts, kind) for kind in ('delta_xi', 'delta_pi'))
+    assert [[c.value for c in row] for row in xi.rows] == [[None, *peaks[:5], None, 7.0]]
+    assert [[c.value for c in row] for row in pi.rows] == [[None, None, None, *peaks[2:]]]
+    assert [head.unit for head in xi.columns] == ['', *['m/s'] * 3, *['rad/s'] * 3, '%']
+    assert [head.unit for head in pi.columns] == ['', *['N'] * 3, *['N m'] * 3]
+
+
 # sweep
 
 

@@ -121,6 +121,7 @@ def test_the_couplings_of_the_papers_vehicle() -> None:
     assert found.correlation[3, 5] == pytest.approx(20 / np.sqrt(40.1 * 154.5))
     assert found.correlation[1, 3] == pytest.approx(-250 * 0.03 / np.sqrt(500 * 40.1))
     assert found.velocity_shares[1, 5] == pytest.approx(500 * 0.075**2 / 154.5)
+    assert_allclose(found.input_shares, input_shares(found.M), atol=1e-12)
     assert set(found.pairs) == {
         ('roll', 'yaw'), ('sway', 'yaw'), ('heave', 'pitch'), ('sway', 'roll'), ('surge', 'pitch'),
     }  # fmt: skip

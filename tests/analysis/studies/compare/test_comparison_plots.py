@@ -230,9 +230,11 @@ def test_tables_of_six_have_a_column_per_degree_of_freedom(small, few) -> None:
         ('pitch', 'N m'), ('yaw', 'N m'),
     ]  # fmt: skip
     assert table.caption == 'Largest magnitude of the input τ.'
-    for one, row in zip(few[:-1], table.rows, strict=False):
-        assert row[0].text == one.name
-        assert [cell.value for cell in row[1:]] == one.summary['effort']['max']
+    for family in ('effort.max', 'coupling.delta_pi_max', 'velocity_error.settling_time'):
+        group, key = family.split('.')
+        for one, row in zip(few[:-1], six_table(small[1], family).rows, strict=False):
+            assert row[0].text == one.name
+            assert [cell.value for cell in row[1:]] == one.summary[group][key]
 
 
 def test_ranks_are_written_beside_their_runs(small, tmp_path: Path) -> None:

@@ -90,6 +90,8 @@ def test_powers_of_the_gains_are_found(monkeypatch, method, approved):
     assert of['sway'][0]['gain'] == 'k_D'
     assert of['sway'][0]['doubled'] == pytest.approx(300.0)
     assert of['surge'][0]['value'] == pytest.approx(3.0)
+    for row in (of['surge'][0], of['sway'][0]):
+        assert row['smallest'] < row['value'] < row['largest']
     reasons = {kpi.column: reason for kpi, reason in found.excluded.items()}
     assert reasons['velocity_error.rms.heave'] == 'the same whatever the gains'
     assert reasons['velocity_error.rms.yaw'] == 'zero throughout'

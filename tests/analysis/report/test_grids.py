@@ -66,7 +66,8 @@ def _axes(*points: float):
 def test_an_axis_is_logarithmic_where_something_positive_is_to_be_seen() -> None:
     for points, scale in (((1.0, 10.0, 1e7), 'log'), ((-1.0, 10.0, 1e7), 'linear'),
                           ((0.0, 0.0, 0.0), 'linear'), ((1.0, 2.0), 'linear'),
-                          ((0.0, 1.0, 2.0), 'log')):  # fmt: skip
+                          ((0.0, 1.0, 2.0), 'log'), ((1.0, np.nan, 1e7), 'log'),
+                          ((np.nan,) * 3, 'linear')):  # fmt: skip
         axes = _axes(*points)
         plots.logarithmic(axes, 'y')
         assert (axes.get_xscale(), axes.get_yscale()) == ('linear', scale), points

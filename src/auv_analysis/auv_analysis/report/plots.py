@@ -334,7 +334,7 @@ def logarithmic(axes: Axes, *directions: str) -> None:
     shown += [np.concatenate(marks)] if marks else []
     for direction in directions:
         values = [points[:, 'xy'.index(direction)] for points in shown]
-        if not any(len(v) > 2 and np.any(v > 0) and np.all(v >= 0) for v in values):
+        if not any(len(v) > 2 and np.any(v > 0) and not np.any(v < 0) for v in values):
             continue  # nothing positive to show: a logarithmic axis has no place for it
         axes.set(**{f'{direction}scale': 'log'})
         axis = getattr(axes, f'{direction}axis')

@@ -27,7 +27,8 @@ class Pairs:
     ratio : Hodges-Lehmann estimate of the ratio, the median of the geometric means of all two
         ratios: below 1 where `effect` is below 0; None where it is that of values which do not
         exist
-    interval : 95 % interval of the ratio, those values that the test does not reject; None as well
+    interval : 95 % interval of the ratio, those values that the test does not reject; None as well,
+        and of fewer than five pairs, of which it rejects none
     p : two-sided Wilcoxon signed-rank test of the logarithms of the ratios
 
     """
@@ -76,7 +77,7 @@ def paired(d: np.ndarray, *, test: bool = True) -> Pairs:
         larger=float((d > 0).mean()),
         effect=_effect(ordered),
         ratio=float(np.exp(middle)) if known else None,
-        interval=ends if known and max(abs(low), abs(high)) < KNOWN else None,
+        interval=ends if known and bound < 1 and max(abs(low), abs(high)) < KNOWN else None,
         p=_p(d) if test else np.nan,
     )
 

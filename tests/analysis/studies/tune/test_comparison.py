@@ -60,12 +60,13 @@ def test_the_loser_is_behind_though_it_is_smaller_in_most_draws() -> None:
 
 
 @pytest.mark.parametrize('decimals', [1, 16])
-@pytest.mark.parametrize('n', [1, 2, 9, 60])
+@pytest.mark.parametrize('n', [1, 2, 4, 5, 9, 60])
 def test_effect_and_ratio_by_their_definitions(n: int, decimals: int) -> None:
     d = np.random.default_rng(n).normal(0.1, 0.3, n).round(decimals)
     found, ranks, (i, j) = paired(d), rankdata(np.abs(d)), np.triu_indices(n)
     assert found.effect == pytest.approx((np.sign(d) * ranks).sum() / ranks.sum())
     assert np.log(found.ratio) == pytest.approx(np.median((d[i] + d[j]) / 2), abs=1e-12)
+    assert (found.interval is None) == (n < 5), 'of so few no ratio is rejected'
     if n == 60:
         outside = [paired(d - np.log(end) * far) for end in found.interval for far in (0.9, 1.1)]
         assert sorted(other.p < 0.05 for other in outside) == [False, False, True, True]

@@ -263,14 +263,3 @@ def test_many_other_combinations_are_said(tmp_path: Path, approved) -> None:
     (found,), notes = designed(open_sweep(make_sweep(tmp_path / 'fewer', text, linear)))
     assert found.cases == [f'initial.nu[0] = {k / 10}' for k in range(8)]
     assert notes == []
-
-
-def test_without_salib_it_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import sys
-
-    out = make_sweep(tmp_path, MORRIS, linear)
-    monkeypatch.setitem(sys.modules, 'SALib', None)
-    results = analysed(open_sweep(out))
-    assert results.notes == ['sensitivity indices need SALib: pip install SALib']
-    assert results.tables['indices'] == []
-    assert results.tables['influence']

@@ -31,6 +31,7 @@ from auv_analysis.output.folder import (
 )
 from auv_analysis.output.new_files import UNFINISHED, write
 from auv_analysis.output.progress import say
+from auv_analysis.scenario.scenario import write_inputs
 from auv_analysis.studies.sweep.campaign import Campaign
 from auv_analysis.studies.sweep.variation import kind_of
 from auv_dynamics.files.errors import InputError
@@ -165,12 +166,9 @@ def _manifest(campaign: Campaign) -> dict[str, Any]:
 
 def _write_inputs(out: Path, campaign: Campaign) -> list[str]:
     """Write texts for people, which are not read again; their names."""
-    from auv_analysis.scenario.scenario import write_inputs
-
     names = list(write_inputs(campaign.scenario, out))
     header = f'# {campaign.path.name} with every default filled in\n'
-    resolved = {**campaign.data, 'scenario': 'scenario.yaml'}
-    text = yaml_text(resolved)
+    text = yaml_text({**campaign.data, 'scenario': 'scenario.yaml'})
     write(out / CAMPAIGN, (header + text).encode())
     return [*names, CAMPAIGN]
 
@@ -190,32 +188,26 @@ def _stored(out: Path) -> dict[str, Any] | None:
 
 
 def _refuse_other(out: Path, stored: dict[str, Any], manifest: dict[str, Any]) -> None:
-    difference = _difference(stored, manifest)
-    if difference is not None:
-        path, before, now = difference
+    for path, before, now in _differences(stored, manifest):
         if path[0] == 'laws':  # digests say nothing to people
             expected = 'the module of the law as when it was begun, or --overwrite'
             raise InputError(out, dotted(path), expected, 'an edited one')
-        with suppress(TypeError):
-            before, now = (json.dumps(x)[:40] for x in (before, now))
-        expected = f'{before} as when it was begun, or --overwrite'
-        raise InputError(out, dotted(path), expected, f'{now}')
+        expected = f'{json.dumps(before)[:40]} as when it was begun, or --overwrite'
+        raise InputError(out, dotted(path), expected, json.dumps(now)[:40])
 
 
-def _difference(
+def _differences(
     a: Any, b: Any, path: tuple[Any, ...] = ()
-) -> tuple[tuple[Any, ...], Any, Any] | None:
-    """Where two JSON documents differ first."""
+) -> Iterator[tuple[tuple[Any, ...], Any, Any]]:
+    """Where two JSON documents differ, and what each has there."""
     if isinstance(a, dict) and isinstance(b, dict):
-        pairs = [(key, a.get(key), b.get(key)) for key in dict.fromkeys([*a, *b])]
+        for key in dict.fromkeys([*a, *b]):
+            yield from _differences(a.get(key), b.get(key), (*path, key))
     elif isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
-        pairs = [(i, x, y) for i, (x, y) in enumerate(zip(a, b, strict=True))]
-    else:
-        return None if a == b else (path, a, b)
-    for key, x, y in pairs:
-        if found := _difference(x, y, (*path, key)):
-            return found
-    return None
+        for i, pair in enumerate(zip(a, b, strict=True)):
+            yield from _differences(*pair, (*path, i))
+    elif a != b:
+        yield path, a, b
 
 
 @lru_cache

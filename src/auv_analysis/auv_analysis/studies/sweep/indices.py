@@ -28,7 +28,6 @@ EFFECTS = ('mu', 'mu_star', 'mu_star_conf', 'sigma')
 MOST_OTHERS = 8  # combinations of the other groups of which each has indices of its own
 FEWEST = 8  # base points or trajectories
 SEED = 1  # of the bootstrap of the confidence intervals; SALib takes 0 for none
-MISSING = 'sensitivity indices need SALib: pip install SALib'
 
 
 class Designed(NamedTuple):
@@ -62,10 +61,6 @@ def designed(sweep: Sweep) -> tuple[list[Designed], list[str]]:
     specs, seed = sweep.campaign['vary'], sweep.campaign['seed']
     if not any(kind_of(spec) in METHODS for spec in specs):
         return [], []
-    try:
-        import SALib  # noqa: F401  its parts are imported where they are used
-    except ImportError:
-        return [], [MISSING]
     groups = [make_group(spec, seed, i, sweep.folder) for i, spec in enumerate(specs)]
     found, notes = [], []
     for i, spec in enumerate(specs):

@@ -171,6 +171,15 @@ def test_a_bounded_difference_ends_with_the_interval_that_it_was_taken_over() ->
     assert pairing.find(400 * MS).nu_d_dot == ZERO
 
 
+def test_an_acceleration_from_its_topic_is_held_with_its_set_point() -> None:
+    pairing = SetpointBuffer(exact=False, acceleration=SAME, steepest=(0.2,) * 6)
+    for k in (0, 10):
+        pairing.setpoint(k * MS, six(1.0))
+        pairing.derivative(k * MS, six(7.0))
+        for ms in (k, k + 1, k + 9):
+            assert pairing.find(ms * MS) == Reference(k * MS, six(1.0), six(7.0))
+
+
 @pytest.mark.parametrize('acceleration', [NONE, FILTER])
 def test_without_a_difference_the_derivative_is_zero(acceleration) -> None:
     pairing = SetpointBuffer(exact=False, acceleration=acceleration)

@@ -184,7 +184,7 @@ class SetpointBuffer:
         if chosen is None:
             return None
         if self._used is not None and chosen == self._used.ns:
-            if self._steepest is not None and ns > self._slope_until:
+            if self._acceleration != SAME and self._steepest and ns > self._slope_until:
                 self._used = self._used._replace(nu_d_dot=ZERO)
             return self._used
         if self._acceleration == SAME:

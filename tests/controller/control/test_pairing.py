@@ -180,6 +180,21 @@ def test_an_acceleration_from_its_topic_is_held_with_its_set_point() -> None:
             assert pairing.find(ms * MS) == Reference(k * MS, six(1.0), six(7.0))
 
 
+def test_a_stamp_of_another_time_is_refused_and_leaves_what_lies_ahead() -> None:
+    pairing = SetpointBuffer(exact=False, acceleration=SAME, steepest=(0.2,) * 6)
+    for s in (100, 101, 102):
+        pairing.setpoint(s * 1000 * MS, six(s))
+        pairing.derivative(s * 1000 * MS, six(-s))
+    assert pairing.find(100_500 * MS).nu_d == six(100)
+    for keep in (pairing.setpoint, pairing.derivative):
+        with pytest.raises(ValueError, match='stamp late'):
+            keep(0, six(0.0))  # without a stamp
+    assert pairing.find(101_500 * MS) == Reference(101_000 * MS, six(101), six(-101))
+    with pytest.raises(ValueError, match='stamp late'):
+        pairing.setpoint(41_000 * MS, six(0.0))  # late, but of this time: of another publisher
+    assert pairing.find(103_000 * MS).nu_d == six(101)
+
+
 @pytest.mark.parametrize('acceleration', [NONE, FILTER])
 def test_without_a_difference_the_derivative_is_zero(acceleration) -> None:
     pairing = SetpointBuffer(exact=False, acceleration=acceleration)

@@ -166,7 +166,8 @@ class SetpointBuffer:
     def _keep(
         self, buffer: OrderedDict[int, tuple[float, ...]], ns: int, values: tuple[float, ...]
     ) -> None:
-        if self._steepest is not None and ns < next(reversed(buffer), ns):
+        of_now = self._used is None or self._used.ns - ns <= AHEAD
+        if self._steepest is not None and of_now and ns < next(reversed(buffer), ns):
             for ahead in (self._nu_d, self._nu_d_dot):
                 for stamp in [stamp for stamp in ahead if stamp >= ns]:
                     del ahead[stamp]

@@ -472,6 +472,15 @@ def test_wrong_uncertainty_ends_with_one_line(extra, words) -> None:
     assert_one_line(run_node('plant_node', *lockstep, *parameters(**extra)), *words)
 
 
+def test_to_run_starts_no_plant_beside_another_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    other = SimpleNamespace(node_name='other', node_namespace='')
+    monkeypatch.setattr(plant_node, 'other_publishers', lambda *_: [other])
+    with program() as made:
+        plant = made.add(PlantNode, {'vehicle': 'herman2018', 'start_paused': True})
+        answer = plant._on_run(SetBool.Request(data=True), SetBool.Response())
+        assert (answer.message, plant.plant.k, plant.exit_code) == ('running', 0, 2)
+
+
 def test_another_clock_may_wait_for_its_name(monkeypatch: pytest.MonkeyPatch, capfd) -> None:
     others: list[SimpleNamespace] = []
     monkeypatch.setattr(plant_node, 'other_publishers', lambda *_: others)

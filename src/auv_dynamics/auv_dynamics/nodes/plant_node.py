@@ -57,20 +57,10 @@ class LockStep:
         return bool(node.window) and node.plant.k - self._ack > node.window
 
     def start(self) -> None:
-        """Publish step 0; later calls do nothing."""
+        """Publish step 0, or the step that a pause has held."""
         if not self._started:
-            self._started = self._published = True
-            self._since = time.monotonic()
-            self._node.publish_state(self._node.plant.k)
-
-    def resume(self) -> None:
-        """Go on after a pause."""
-        if self._since is not None:
-            self._since = time.monotonic()
+            self._started, self._since = True, time.monotonic()
         self._go_on()
-
-    def pause(self) -> None:
-        """Hold the next step."""
 
     def reset(self) -> int:
         """Put the vehicle back, at the next step where this one is known; which step that is."""
@@ -128,7 +118,7 @@ class LockStep:
             # one that is stopped for long leaves the graph, or loses its name; it is named here
             if names and UNNAMED not in names:
                 self._publishers[topic] = ', '.join(sorted(names))
-        if time.monotonic() - self._since > node.wrench_timeout:
+        if time.monotonic() - max(self._since, node.resumed) > node.wrench_timeout:
             silent = (topics.WRENCH.name, 'no controller')
             if not self._published:
                 silent = (topics.PROGRESS.name, 'no recorder')
@@ -159,20 +149,12 @@ class RealTime:
         node.graph.in_trouble_while(self._silence)
 
     def start(self) -> None:
-        """Start the clock; later calls do nothing."""
+        """Start the clock, also after a pause; while it runs this does nothing."""
         if self._began is None and self._ended is None:
             self._began = time.monotonic()
             if not hasattr(self, '_timer'):
                 self._timer = steady_timer(self._node, self._node.step_ns / 1e9, self._tick)
             self._tick()
-
-    def resume(self) -> None:
-        """Go on after a pause, from the step that was held."""
-        self.start()
-
-    def pause(self) -> None:
-        """Hold the clock."""
-        self._began, self._first = None, self._node.plant.k
 
     def wrench(self, ns: int, tau: tuple[float, ...]) -> None:
         """Hold this wrench from now on."""
@@ -207,6 +189,8 @@ class RealTime:
     def _tick(self) -> None:
         node, plant = self._node, self._node.plant
         self._end()
+        if node.paused:
+            self._began, self._first = None, plant.k
         if self._began is None:
             return
         due = self._first + int((time.monotonic() - self._began) * 1e9) // node.step_ns
@@ -265,7 +249,7 @@ class PlantNode(BulkNode):
         self.graph.listen(topics.WRENCH, self.pace.wrench, qos)
         self.create_service(SetBool, '~/run', self._on_run)
         self.create_service(Trigger, '~/reset', self._on_reset)
-        self.paused = p.start_paused
+        self.paused, self.resumed = p.start_paused, 0.0  # and when, steady clock, s
         self._started: float | None = None
         self._alone = time.monotonic()  # when nobody else published the clock
         steady_timer(self, 0.05, self._start)
@@ -371,8 +355,8 @@ class PlantNode(BulkNode):
         if request.data:
             reason = self.peers.not_ready() or ('' if self.graph.ready() else interface.PLANT)
         if not reason:
-            self.paused = not request.data
-            self.pace.resume() if request.data else self.pace.pause()
+            self.paused, self.resumed = not request.data, time.monotonic()
+            self._start()
         word = 'running' if request.data else 'paused'
         response.success, response.message = not reason, reason or word
         return response

@@ -51,11 +51,6 @@ class LockStep:
             node.graph.subscribe(topics.PROGRESS, self._on_progress, qos)
         steady_timer(node, WATCH, self._watch)
 
-    @property
-    def _waits_for_credit(self) -> bool:
-        node = self._node
-        return bool(node.window) and node.plant.k - self._ack > node.window
-
     def start(self) -> None:
         """Publish step 0, or the step that a pause has held."""
         if not self._started:
@@ -76,34 +71,30 @@ class LockStep:
         expected = plant.k * node.step_ns
         if not (self._published and ns == expected):
             raise interface.BadMessageError(f'wrench: stamp: expected {expected} ns, found {ns} ns')
-        k = plant.k
-        applied, F = plant.answer(tau)
+        k, self._published = plant.k, False
+        forces = plant.answer(tau)
         if k == node.last:
-            node.publish_forces(k, applied, F)
-            self._published = False
             self._since = None
-            if not node.window:
-                node.end(0)
-            return
-        plant.advance()
-        self._published = False
-        if self._reset:
-            self._reset = False
-            plant.reset()
+        else:
+            plant.advance()
+            if self._reset:
+                self._reset = False
+                plant.reset()
+            if not plant.diverged:
+                self._go_on()
+        node.publish_forces(k, *forces)
         if plant.diverged:
-            node.publish_forces(k, applied, F)
             node.end(1, DIVERGES.format(k))
-            return
-        self._go_on()
-        node.publish_forces(k, applied, F)
+        elif k == node.last and not node.window:
+            node.end(0)
 
     def _go_on(self) -> None:
-        held = self._node.paused or self._waits_for_credit
-        if self._since is None or self._published or held:
+        node = self._node
+        waits_for_credit = node.window and node.plant.k - self._ack > node.window
+        if self._since is None or self._published or node.paused or waits_for_credit:
             return
-        self._published = True
-        self._since = time.monotonic()
-        self._node.publish_state(self._node.plant.k)
+        self._published, self._since = True, time.monotonic()
+        node.publish_state(node.plant.k)
 
     def _on_progress(self, message: bytes, _: dict[str, Any]) -> None:
         self._ack = max(self._ack, first_stamp(message) // self._node.step_ns)

@@ -103,14 +103,6 @@ def test_the_largest_speeds_themselves_are_believed():
     assert make().accept(0, (3.0, 4.0, 0.0, 0.0, 0.0, -2.0)) == 0.0
 
 
-def test_reset_starts_anew():
-    guard = make(lockstep=True)
-    guard.accept(1000 * MS, SLOW)
-    guard.reset()
-    assert guard.accept(5 * MS, SLOW) == 0.0
-    assert guard.accept(10 * MS, SLOW) == 0.005
-
-
 def aged(clock: str, most: float = 0.5) -> OdometryGuard:
     age = StampAge(clock, round(most * 1e9))
     return OdometryGuard(100 * MS, Limits(5.0, 2.0), lockstep=False, patience=0.5, age=age)

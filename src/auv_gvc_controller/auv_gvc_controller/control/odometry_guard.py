@@ -76,43 +76,28 @@ class StampAge:
     """
 
     def __init__(self, clock: str, most_ns: int):
-        self._clock, self._most = clock, most_ns
+        self._clock, self._most = clock, most_ns / 1e9
         self.reset()
 
     def reset(self) -> None:
         """Forget the freshest stamp, as when their clock has jumped."""
         self._freshest: tuple[float, float] | None = None  # steady s minus stamp s, and when
 
-    def of(self, ns: int, now: Now) -> float:
-        """Age in s of a stamp, negative ahead of the clock."""
-        if self._runs_free(ns, now):
-            return self._relative(ns, now.steady)
-        return (now.ros_ns - ns) / 1e9
-
-    def _runs_free(self, ns: int, now: Now) -> bool:
-        """Whether the stamp's clock cannot be compared with the node's."""
-        apart = now.ros_ns == 0 or abs(now.ros_ns - ns) > SAME_EPOCH
-        return self._clock == OWN or (self._clock == AUTO and apart)
-
-    def check(self, ns: int, now: Now) -> None:
-        """Raise ValueError for a stamp that is too old or ahead of the clock."""
-        age, most = self.of(ns, now), self._most / 1e9
-        if age > most:
-            raise ValueError(f'stamp old: expected at most {most:g} s, found {age:.3g} s')
-        if -age > most:
-            text = f'expected at most {most:g} s ahead of the clock, found {-age:.3g} s'
-            raise ValueError(f'stamp ahead of the clock: {text}')
-
     def accept(self, ns: int, now: Now) -> None:
-        """Remember a stamp that is used."""
-        if self._runs_free(ns, now):
-            self._freshest = (now.steady - ns / 1e9 - self._relative(ns, now.steady), now.steady)
-
-    def _relative(self, ns: int, steady: float) -> float:
-        if self._freshest is None:
-            return 0.0
-        offset, at = self._freshest
-        return max(0.0, steady - ns / 1e9 - offset - DRIFT * (steady - at))
+        """Take a stamp; ValueError where it is too old or ahead of the clock."""
+        apart = now.ros_ns == 0 or abs(now.ros_ns - ns) > SAME_EPOCH
+        free = self._clock == OWN or (self._clock == AUTO and apart)  # cannot be compared
+        age, behind = (now.ros_ns - ns) / 1e9, now.steady - ns / 1e9  # s
+        if free:
+            offset, at = self._freshest or (behind, now.steady)
+            age = max(0.0, behind - offset - DRIFT * (now.steady - at))
+        if age > self._most:
+            raise ValueError(f'stamp old: expected at most {self._most:g} s, found {age:.3g} s')
+        if -age > self._most:
+            text = f'expected at most {self._most:g} s ahead of the clock, found {-age:.3g} s'
+            raise ValueError(f'stamp ahead of the clock: {text}')
+        if free:
+            self._freshest = behind - age, now.steady
 
 
 UNTIMED = Now(0.0)  # lock-step: no clock but that of the stamps
@@ -147,10 +132,6 @@ class OdometryGuard:
     ):
         self._gap, self._limits, self._lockstep = gap_ns, limits, lockstep
         self._patience, self._age = patience, age
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget everything, as at activation."""
         self.last: int | None = None
         self.origin = 0
         self.restarts = 0
@@ -176,7 +157,6 @@ class OdometryGuard:
         if self._age is not None:
             if restarted:
                 self._age.reset()
-            self._age.check(ns, now)
             self._age.accept(ns, now)
         if self.last is None:
             self.origin = ns

@@ -47,7 +47,7 @@ def try_messages(data: bytes) -> str:
     )  # fmt: skip
     _law.reset()
     controller = VelocityController(
-        _law, pairing, guard, OutputStage(LIMIT, ramp=0.2), exact=False, timeouts=Timeouts(0.5, 0.5)
+        _law, pairing, guard, OutputStage(LIMIT, ramp=0.2), timeouts=Timeouts(0.5, 0.5)
     )
     good = [CODECS[TOPICS[i]].decode(message[1:]) for i, message in enumerate(messages())]
     topic = TOPICS[data[0] % len(TOPICS)]

@@ -59,7 +59,6 @@ class Bench:
             self.pairing,
             OdometryGuard(100 * MS, Limits(50.0, 50.0), lockstep, patience=odometry),
             OutputStage(limit, ramp=ramp),
-            exact=exact,
             timeouts=None if lockstep else Timeouts(odometry, setpoint),
             reference_filter=reference,
         )

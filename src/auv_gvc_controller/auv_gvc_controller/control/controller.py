@@ -143,13 +143,12 @@ class VelocityController:
         guard: OdometryGuard,
         output: OutputStage,
         *,
-        exact: bool,
         timeouts: Timeouts | None,
         reference_filter: ReferenceFilter | None = None,
     ):
         self._filter = reference_filter
         self._law, self._setpoints, self._guard, self._output = law, setpoints, guard, output
-        self._exact, self._timeouts = exact, timeouts
+        self._timeouts = timeouts
         self._waiting: tuple[int, tuple[float, ...], float] | None = None
         self._heard: float | None = None  # steady s of the last odometry; None: none is missed
         self._unanswered_since = 0.0
@@ -208,7 +207,7 @@ class VelocityController:
         silent = self._silent(now)
         reference = self._setpoints.find(ns)
         if reference is None:
-            return None if self._exact else self._trip(ns, 'no set-point yet', now)
+            return None if self._setpoints.exact else self._trip(ns, 'no set-point yet', now)
         stale = self._stale(ns, reference, silent)
         if stale:
             return self._trip(ns, stale, now)
@@ -251,7 +250,7 @@ class VelocityController:
         """Disengage between two odometries, however rare they are, until the wrench is zero."""
         if self._output.idle:
             return None
-        ns, silent = self._guard.last or 0, '' if self._exact else self._silent(now)
+        ns, silent = self._guard.last or 0, '' if self._setpoints.exact else self._silent(now)
         if silent and self._in_charge:
             return self._trip(ns, silent, now)
         return self._disengage(ns, self.watchdog, now) if self.watchdog else None

@@ -115,7 +115,7 @@ class SetpointBuffer:
         limits: Limits = UNLIMITED,
         steepest: tuple[float, ...] | None = None,
     ):
-        self._exact, self._acceleration = exact, acceleration
+        self.exact, self._acceleration = exact, acceleration
         self.believe(limits, steepest)
         self._nu_d: OrderedDict[int, tuple[float, ...]] = OrderedDict()
         self._nu_d_dot: OrderedDict[int, tuple[float, ...]] = OrderedDict()
@@ -202,7 +202,7 @@ class SetpointBuffer:
         return ns in self._nu_d and (self._acceleration != SAME or ns in self._nu_d_dot)
 
     def _choose(self, ns: int) -> int | None:
-        if self._exact:
+        if self.exact:
             used = self._used is not None and self._used.ns == ns
             return ns if used or self._complete(ns) else None
         earlier = [stamp for stamp in self._nu_d if stamp <= ns and self._complete(stamp)]

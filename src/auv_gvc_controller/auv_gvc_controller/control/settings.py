@@ -135,17 +135,13 @@ class ControllerSettings:
 
     def setpoints(self) -> SetpointBuffer:
         """Buffer that keeps set-points until their odometry comes."""
-        return SetpointBuffer(self.exact, self.setpoint_acceleration, *self.believed)
+        exact = self.setpoint_pairing == EXACT
+        return SetpointBuffer(exact, self.setpoint_acceleration, *self.believed)
 
     @property
     def believed(self) -> tuple[Limits, tuple[float, ...] | None]:
         """Limits of set-points, and those of the difference of two."""
         return self.limits, None if self.lockstep else self._steepest
-
-    @property
-    def exact(self) -> bool:
-        """Whether only the set-point of the odometry's own stamp is taken."""
-        return self.setpoint_pairing == EXACT
 
     @property
     def limits(self) -> Limits:
@@ -189,7 +185,6 @@ class ControllerSettings:
             setpoints,
             guard,
             OutputStage(self._wrench_limit(vehicle), self.limits_wrench_rate, ramp),
-            exact=self.exact,
             timeouts=timeouts if live else None,
             reference_filter=self._reference_filter(),
         )

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
@@ -172,13 +172,6 @@ LATE = 1.0  # s without a message, after which nobody is said to publish
 NO_ODOMETRY, NO_SETPOINT = 'no odometry', 'no set-point'  # what the watchdog's texts begin with
 
 
-class Heard(NamedTuple):
-    """Newest stamp of a topic, ns, and when it came by the steady clock, s."""
-
-    ns: int = 0
-    at: float = -math.inf
-
-
 class Idle:
     """Explains the watchdog of a controller by what has been heard.
 
@@ -191,11 +184,12 @@ class Idle:
 
     def __init__(self, node: Any, derivative: bool):
         self._node, self._derivative = node, derivative
-        self._heard = dict[str, Heard]()  # by topic
+        # topic -> its newest stamp, ns, and when that came by the steady clock, s
+        self._heard = dict.fromkeys((topics.CMD_VEL, topics.CMD_ACCEL), (0, -math.inf))
 
     def hear(self, topic: topics.Topic, ns: int) -> None:
         """Note a set-point or its derivative."""
-        self._heard[topic.name] = Heard(ns, time.monotonic())
+        self._heard[topic] = ns, time.monotonic()
 
     def health(self, watchdog: str, odometry_ns: int | None) -> Health:
         """Level and explanation of what the watchdog says.
@@ -208,32 +202,24 @@ class Idle:
         """
         if not watchdog and odometry_ns is None:
             watchdog = f'{NO_ODOMETRY} yet'
+        level, why = ERROR if watchdog else OK, ''
         if watchdog.startswith(NO_ODOMETRY):
-            return STALE, _joined(watchdog, why_silent(self._node, topics.ODOM))
-        if watchdog.startswith(NO_SETPOINT):
-            return WARN, _joined(watchdog, self._no_setpoint(odometry_ns or 0))
-        return (ERROR, watchdog) if watchdog else (OK, '')
+            level, why = STALE, why_silent(self._node, topics.ODOM)
+        elif watchdog.startswith(NO_SETPOINT):
+            level, why = WARN, self._no_setpoint(odometry_ns or 0)
+        return level, f'{watchdog}: {why}' if why else watchdog
 
     def _no_setpoint(self, odometry_ns: int) -> str:
-        setpoint = self._heard.get(topics.CMD_VEL.name, Heard())
-        if time.monotonic() - setpoint.at > LATE:
+        (ns, at), (_, derivative_at) = self._heard.values()
+        if time.monotonic() - at > LATE:
             return why_silent(self._node, topics.CMD_VEL)
-        derivative = self._heard.get(topics.CMD_ACCEL.name, Heard())
-        if self._derivative and time.monotonic() - derivative.at > LATE:
+        if self._derivative and time.monotonic() - derivative_at > LATE:
             silent = why_silent(self._node, topics.CMD_ACCEL) or 'no cmd_accel of its stamp comes'
             return f'{silent}; setpoint_acceleration: topic waits for it'
-        if abs(apart := (setpoint.ns - odometry_ns) / NANOSECONDS) > LATE:
-            found = (
-                'stamp 0'
-                if setpoint.ns == 0
-                else f'stamps {abs(apart):.3g} s apart from those of odom'
-            )
+        if (apart := abs(ns - odometry_ns) / NANOSECONDS) > LATE:
+            found = f'stamps {apart:.3g} s apart from those of odom' if ns else 'stamp 0'
             return f'cmd_vel: expected the time at which it is valid as stamp, found {found}'
         return ''
-
-
-def _joined(watchdog: str, why: str) -> str:
-    return f'{watchdog}: {why}' if why else watchdog
 
 
 WATCH = 0.02  # s between two looks at what stays away

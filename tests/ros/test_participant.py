@@ -22,7 +22,7 @@ from auv_dynamics.ros.rclpy_internals import RCLError
 from auv_dynamics.ros.security import loopback
 
 CALLS: list[tuple[str, str, Callable[[Watcher], Any]]] = [
-    ('_executor', 'spin_once', lambda graph: graph._spin_once(0.1)),
+    ('_executor', 'spin_once', lambda graph: graph.spin(0.1)),
     ('_node', 'get_node_names_and_namespaces', Watcher.nodes),
     ('_node', 'get_topic_names_and_types', Watcher.endpoints),
     ('_run', 'service_is_ready', Watcher.ask_to_run),

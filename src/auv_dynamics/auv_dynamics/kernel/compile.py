@@ -22,7 +22,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 PACKAGES = ('auv_dynamics', 'auv_gvc_controller', 'auv_analysis')
 # a decorator of these, a method that `specialised` compiles, or how numba is told
@@ -33,13 +33,6 @@ COMPILES = re.compile(
 )
 IMPORT = re.compile(rb'^\s*(?:from|import)\s+(auv_[\w.]+)(?:\s+import\s+(\([^)]*\)|.*))?', re.M)
 Function = TypeVar('Function', bound=Callable[..., Any])
-
-
-class Decorator(Protocol):
-    """What compiles a function and leaves how it is called as it was."""
-
-    def __call__(self, function: Function, /) -> Function:
-        """Compile a function."""
 
 
 def _sources() -> dict[str, bytes]:
@@ -245,7 +238,9 @@ def plain(function: Function) -> Function:
     return getattr(function, 'py_func', function)
 
 
-def specialised(argument: str, method: Callable[[Any, str], Any] = getattr) -> Decorator:
+def specialised(
+    argument: str, method: Callable[[Any, str], Any] = getattr
+) -> Callable[[Function], Function]:
     """Let a generic function be compiled for the class of one of its arguments.
 
     The decorated function says in Python what it does: call the static method of its own name of

@@ -67,11 +67,8 @@ class Participant:
         """Handle what comes in for so long."""
         until = time.monotonic() + seconds
         while (left := until - time.monotonic()) > 0:
-            self._spin_once(left)
-
-    @undisturbed()
-    def _spin_once(self, seconds: float) -> None:
-        self._executor.spin_once(timeout_sec=seconds)
+            with undisturbed():
+                self._executor.spin_once(timeout_sec=left)
 
     @undisturbed()
     def nodes(self) -> set[str]:

@@ -64,21 +64,7 @@ class DataWait:
             self._waiting.wait(int(timeout * 1e9))
 
 
-def type_support(kind: type) -> Any:
-    """Capsule with the type support of a message class."""
-    of_class: Any = type(kind)
-    if of_class._TYPE_SUPPORT is None:  # noqa: SLF001
-        of_class.__import_type_support__()
-    return of_class._TYPE_SUPPORT  # noqa: SLF001
-
-
-def class_of(name: str, support: Any, keeps: Any) -> type:
-    """Stand-in for a message class that has a type support, which lives as long as `keeps`."""
-    verbs = ('CREATE_ROS_MESSAGE', 'CONVERT_FROM_PY', 'CONVERT_TO_PY', 'DESTROY_ROS_MESSAGE')
-    entries = {'_TYPE_SUPPORT': support, 'keeps': keeps} | {f'_{verb}': support for verb in verbs}
-    return type('RawType', (type,), entries)(name, (), {})
-
-
+VERBS = ('CREATE_ROS_MESSAGE', 'CONVERT_FROM_PY', 'CONVERT_TO_PY', 'DESTROY_ROS_MESSAGE')
 MIDDLEWARE = 'rmw_fastrtps_cpp'  # whose type supports are laid out as below
 IDENTIFIER = b'rosidl_typesupport_fastrtps_c'
 FIND = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p, ctypes.c_char_p)
@@ -142,11 +128,17 @@ def raw_class(name: str) -> type:
         [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p],
     )
     support = new(ctypes.addressof(handle), None, None)
-    return class_of(match[2], support, (handle, callbacks))
+    # the type support lives as long as the class that keeps it
+    entries: dict[str, Any] = {'_TYPE_SUPPORT': support, 'keeps': (handle, callbacks)}
+    entries |= {f'_{verb}': support for verb in VERBS}
+    return type('RawType', (type,), entries)(match[2], (), {})
 
 
 def _installed() -> _Handle:
     """Type support of an installed type, which finds that of the middleware."""
+    of_class: Any = type(String)
+    if of_class._TYPE_SUPPORT is None:  # noqa: SLF001
+        of_class.__import_type_support__()
     pointer = ctypes.pythonapi.PyCapsule_GetPointer
     pointer.restype, pointer.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
-    return _Handle.from_address(pointer(type_support(String), None))
+    return _Handle.from_address(pointer(of_class._TYPE_SUPPORT, None))  # noqa: SLF001

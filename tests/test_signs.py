@@ -72,10 +72,10 @@ FORMULAS = [
     ),
     Formula(
         'U x', 'auv_dynamics.kernel.six',
-        ['vector', 'fill_vector', 'add', 'sub', '_row', 'upper', 'upper_T'], check_algebra, 62,
+        ['vector', 'fill_vector', 'add', 'sub', 'dot', 'upper', 'upper_T'], check_algebra, 62,
     ),
     Formula(
-        'F', MODEL, ['acceleration'], lambda m: check_F(plain(m.acceleration)), 24
+        'F', MODEL, ['acceleration'], lambda m: check_F(plain(m.acceleration)), 4
     ),
     Formula(
         'F inverse', 'auv_dynamics.vehicle.vehicle', ['Vehicle.inverse_dynamics'],
@@ -104,7 +104,7 @@ FORMULAS = [
     ),
     Formula(
         'F current', 'auv_dynamics.plant.uncertainty',
-        ['make_current', 'to_body', 'true_acceleration'], check_current, 33,
+        ['make_current', 'to_body', 'true_acceleration'], check_current, 18,
     ),
     Formula(
         'F lumped', 'auv_dynamics.plant.uncertainty', ['with_errors', 'lumped'],

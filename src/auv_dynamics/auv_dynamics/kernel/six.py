@@ -76,7 +76,8 @@ def scale(N: Vector, a: Vector) -> Six:
 
 
 @helper
-def _row(A: np.ndarray, i: int, a: Vector) -> Number:
+def dot(A: np.ndarray, i: int, a: Vector) -> Number:
+    """Product of six numbers of a 1-D array from index i with a."""
     return (
         A[i] * a[0]
         + A[i + 1] * a[1]
@@ -91,12 +92,12 @@ def _row(A: np.ndarray, i: int, a: Vector) -> Number:
 def matvec(A: np.ndarray, a: Vector) -> Six:
     """A a with the full matrix A (36,)."""
     return (
-        _row(A, 0, a),
-        _row(A, 6, a),
-        _row(A, 12, a),
-        _row(A, 18, a),
-        _row(A, 24, a),
-        _row(A, 30, a),
+        dot(A, 0, a),
+        dot(A, 6, a),
+        dot(A, 12, a),
+        dot(A, 18, a),
+        dot(A, 24, a),
+        dot(A, 30, a),
     )
 
 

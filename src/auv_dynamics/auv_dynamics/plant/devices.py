@@ -11,8 +11,11 @@ from auv_dynamics.kernel.six import (
     Numbers,
     Six,
     Vector,
+    add,
     clipped,
     fill_vector,
+    scale,
+    vector,
 )
 from auv_dynamics.plant.actuators import (
     Actuators,
@@ -147,19 +150,6 @@ def fill_heard(fault: np.ndarray, tau: Vector, held: np.ndarray) -> Six:
 
 
 @helper
-def left_of_axes(fault: np.ndarray, c: Vector) -> Six:
-    """Wrench that remains under faults of whole axes."""
-    return (
-        fault[AXES] * c[0] + fault[AXES + 6],
-        fault[AXES + 1] * c[1] + fault[AXES + 7],
-        fault[AXES + 2] * c[2] + fault[AXES + 8],
-        fault[AXES + 3] * c[3] + fault[AXES + 9],
-        fault[AXES + 4] * c[4] + fault[AXES + 10],
-        fault[AXES + 5] * c[5] + fault[AXES + 11],
-    )
-
-
-@helper
 def fill_faulty(
     actuators: Actuators, fault: np.ndarray, k: int, tau: Vector, state: np.ndarray
 ) -> Numbers:
@@ -168,7 +158,8 @@ def fill_faulty(
     command = waited(actuators, k, heard, state)
     c = fill_allocated(actuators.rotors, actuators, fault[THRUSTERS:], k, command, state)
     c = clipped(c, actuators.reach.limit)
-    return fill_slowed(actuators.follow, actuators.slew, left_of_axes(fault, c), state[0])
+    c = add(scale(vector(fault, AXES), c), vector(fault, AXES + 6))  # faults of whole axes
+    return fill_slowed(actuators.follow, actuators.slew, c, state[0])
 
 
 compiled_measured, compiled_arrived = compiled(fill_measured), compiled(fill_arrived)

@@ -19,6 +19,7 @@ from auv_dynamics.kernel.six import (
     sub,
 )
 from auv_dynamics.plant.disturbance import Disturbance, Harmonics, make_disturbance
+from auv_dynamics.vehicle.kinematics import position_rate
 from auv_dynamics.vehicle.model import (
     Model,
     acceleration,
@@ -77,14 +78,9 @@ def varies(spec: Mapping[str, Any]) -> bool:
 
 @helper
 def to_body(attitude: Vector, v: Vector) -> tuple[Number, Number, Number]:
-    """R(q)^T v: a vector in NED seen in the body frame."""
+    """R(q)^T v: a vector in NED seen in the body frame; R^T is R of the conjugate."""
     w, x, y, z = attitude
-    a, b, c = v
-    return (
-        (1.0 - 2.0 * (y * y + z * z)) * a + 2.0 * (x * y + w * z) * b + 2.0 * (x * z - w * y) * c,
-        2.0 * (x * y - w * z) * a + (1.0 - 2.0 * (x * x + z * z)) * b + 2.0 * (y * z + w * x) * c,
-        2.0 * (x * z + w * y) * a + 2.0 * (y * z - w * x) * b + (1.0 - 2.0 * (x * x + y * y)) * c,
-    )
+    return position_rate((w, -x, -y, -z), v)
 
 
 APART = ('mass', 'added_mass', 'damping')  # relative errors, for M_RB and M_A given apart

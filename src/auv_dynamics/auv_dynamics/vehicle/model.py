@@ -15,6 +15,7 @@ from auv_dynamics.kernel.six import (
     Vector,
     add,
     matvec,
+    sub,
 )
 
 
@@ -105,14 +106,4 @@ def acceleration(model: Model, attitude: Vector, nu: Vector, tau: Vector, F: Vec
     c = coriolis(model.M, nu, nu)
     d = damping(model, nu, nu)
     g = restoring(model, attitude)
-    return matvec(
-        model.M_inv,
-        (
-            tau[0] - c[0] - d[0] - g[0] - F[0],
-            tau[1] - c[1] - d[1] - g[1] - F[1],
-            tau[2] - c[2] - d[2] - g[2] - F[2],
-            tau[3] - c[3] - d[3] - g[3] - F[3],
-            tau[4] - c[4] - d[4] - g[4] - F[4],
-            tau[5] - c[5] - d[5] - g[5] - F[5],
-        ),
-    )
+    return matvec(model.M_inv, sub(sub(sub(sub(tau, c), d), g), F))

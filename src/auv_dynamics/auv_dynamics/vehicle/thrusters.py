@@ -19,6 +19,7 @@ from auv_dynamics.kernel.six import (
     Vector,
     add,
     clipped,
+    dot,
     scale,
     sub,
 )
@@ -294,15 +295,7 @@ def six_numbers(value: Any) -> np.ndarray:
 @helper
 def thrust(reach: AttainableWrench, i: int, tau: Vector) -> Number:
     """u_i of u = T^+ tau in N, without limits."""
-    T_inv = reach.T_inv
-    return (
-        T_inv[i, 0] * tau[0]
-        + T_inv[i, 1] * tau[1]
-        + T_inv[i, 2] * tau[2]
-        + T_inv[i, 3] * tau[3]
-        + T_inv[i, 4] * tau[4]
-        + T_inv[i, 5] * tau[5]
-    )
+    return dot(reach.T_inv[i], 0, tau)
 
 
 @helper

@@ -74,13 +74,7 @@ def make_actuators(
     """
     if spec is None:
         return IDEAL
-    delay = float(spec.get('delay', 0.0)) / step
-    if abs(delay - round(delay)) > WHOLE:
-        expected = f'a multiple of step ({step:g} s)'
-        raise InputError(file, 'actuators.delay', expected, f'{spec["delay"]} s')
-    if delay > MOST_STEPS:
-        expected = f'at most {MOST_STEPS} steps of {step:g} s'
-        raise InputError(file, 'actuators.delay', expected, f'{spec["delay"]} s')
+    delay = steps_of(spec.get('delay', 0.0), step, file, 'actuators.delay')
     use_thrusters = bool(spec.get('thrusters', False))
     if use_thrusters and vehicle.thrusters is None:
         expected = f'a vehicle with thrusters, {vehicle.name} has none'
@@ -96,9 +90,19 @@ def make_actuators(
         make_reach(spec.get('limit'), thrusters, spec.get('saturation', SCALED)),
         np.full(6, np.inf) if spec.get('rate') is None else six_numbers(spec['rate']) * step,
         np.full(6, 1.0 if lag == 0 else -np.expm1(-step / lag)),
-        round(delay),
+        delay,
         rotors,
     )
+
+
+def steps_of(delay: float, step: float, file: object, key: str, least: int = 0) -> int:
+    """Number of steps of a delay in s; InputError: no multiple of the step, or too many of them."""
+    steps = delay / step
+    if abs(steps - round(steps)) > WHOLE or round(steps) < least:
+        raise InputError(file, key, f'a multiple of step ({step:g} s)', f'{delay} s')
+    if steps > MOST_STEPS:
+        raise InputError(file, key, f'at most {MOST_STEPS} steps of {step:g} s', f'{delay} s')
+    return round(steps)
 
 
 IDEAL = Actuators(True, make_reach(None, None), np.full(6, np.inf), np.ones(6), 0)

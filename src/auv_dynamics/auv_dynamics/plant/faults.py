@@ -13,7 +13,7 @@ import numpy as np
 
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import one_of
-from auv_dynamics.plant.actuators import MOST_STEPS, WHOLE
+from auv_dynamics.plant.actuators import WHOLE, steps_of
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.thrusters import Thrusters
 
@@ -159,7 +159,7 @@ def make_faults(
         if spec['kind'] == 'thruster':
             spec['thruster'] = _thruster(spec, place, setting)
         if spec['kind'] == 'sensor_delay':
-            _check_delay(spec, place, setting)
+            steps_of(spec['delay'], setting.step, setting.file, f'{place}.delay', least=1)
         nth = sum(other.kind == spec['kind'] for other in entries)
         fault = Fault(spec, first, end, nth)
         for other, where in zip(entries, places, strict=False):
@@ -215,16 +215,6 @@ def _thruster(spec: Mapping[str, Any], place: str, setting: FaultSetting) -> str
             expected = f'a thrust of {name}, {least:g} to {most:g} N'
             raise InputError(file, f'{place}.stuck', expected, f'{spec["stuck"]:g} N')
     return name
-
-
-def _check_delay(spec: Mapping[str, Any], place: str, setting: FaultSetting) -> None:
-    steps = spec['delay'] / setting.step
-    if abs(steps - round(steps)) > WHOLE or round(steps) < 1:
-        expected = f'a multiple of step ({setting.step:g} s)'
-        raise InputError(setting.file, f'{place}.delay', expected, f'{spec["delay"]:g} s')
-    if steps > MOST_STEPS:
-        expected = f'at most {MOST_STEPS} steps of {setting.step:g} s'
-        raise InputError(setting.file, f'{place}.delay', expected, f'{spec["delay"]:g} s')
 
 
 def _check_apart(fault: Fault, other: Fault, place: str, where: str, setting: FaultSetting) -> None:

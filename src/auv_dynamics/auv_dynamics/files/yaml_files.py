@@ -82,22 +82,10 @@ for _first, _entries in _Loader.yaml_implicit_resolvers.items():
         _Dumper.add_implicit_resolver(_tag, _pattern, [_first])
 
 
-def yaml_text(
-    data: Any,
-    *,
-    default_flow_style: bool | None = None,
-    width: float = 100,
-    allow_unicode: bool = False,
-) -> str:
+def yaml_text(data: Any, **options: Any) -> str:
     """YAML that reads back as it is; entries in the order of `data`, options as PyYAML's."""
-    return yaml.dump(
-        data,
-        Dumper=_Dumper,
-        sort_keys=False,
-        default_flow_style=default_flow_style,
-        width=width,
-        allow_unicode=allow_unicode,
-    )
+    usual: dict[str, Any] = {'sort_keys': False, 'default_flow_style': None, 'width': 100}
+    return yaml.dump(data, Dumper=_Dumper, **usual | options)
 
 
 def parse_yaml(text: str, path: object, kind: str) -> dict[str, Any]:

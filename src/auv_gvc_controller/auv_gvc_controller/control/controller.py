@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from auv_gvc_controller.control.odometry_guard import UNTIMED, ZERO, Now, OdometryGuard
 from auv_gvc_controller.control.sampled_law import SampledLaw
-from auv_gvc_controller.control.setpoint_buffer import Reference, ReferenceFilter, SetpointBuffer
+from auv_gvc_controller.control.setpoint_buffer import ReferenceFilter, SetpointBuffer
 
 FEWEST = 10  # answers over which a law engages at least, however rare they are
 
@@ -208,9 +208,11 @@ class VelocityController:
         reference = self._setpoints.find(ns)
         if reference is None:
             return None if self._setpoints.exact else self._trip(ns, 'no set-point yet', now)
-        stale = self._stale(ns, reference, silent)
-        if stale:
-            return self._trip(ns, stale, now)
+        age = (ns - reference.ns) / 1e9
+        if self._timeouts is not None and age > self._timeouts.setpoint:
+            silent = f'no set-point for {age:.3g} s'
+        if silent:
+            return self._trip(ns, silent, now)
         self._waiting = None
         if self._bridge:
             self._law.forget_rate()
@@ -277,13 +279,6 @@ class VelocityController:
             return ''
         self._setpoints.leave()
         return f'no set-point heard for {late.setpoint:g} s'
-
-    def _stale(self, ns: int, reference: Reference, silent: str) -> str:
-        """Why a set-point is not followed any more, or an empty text."""
-        if self._timeouts is None:
-            return ''
-        age = (ns - reference.ns) / 1e9
-        return f'no set-point for {age:.3g} s' if age > self._timeouts.setpoint else silent
 
     def _trip(self, ns: int, trouble: str, now: Now) -> Answer:
         """Disengage because of a watchdog: in real time the integrals do not outlive it."""

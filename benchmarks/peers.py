@@ -97,8 +97,8 @@ def closed_loop(scenario: Scenario, controller: str) -> tuple[Rate, np.ndarray]:
 
 def _set_point(scenario: Scenario) -> Callable[[float], tuple[np.ndarray, np.ndarray]]:
     harmonics = scenario.setpoint
-    rows = [(i, *term) for i in range(6) for term in harmonics.terms[i]]  # type: ignore[attr-defined]
-    offset = harmonics.offset  # type: ignore[attr-defined]
+    rows = [(i, *term) for i in range(6) for term in harmonics.terms[i]]  # type: ignore[union-attr]
+    offset = harmonics.offset  # type: ignore[union-attr]
     place = np.zeros((6, len(rows)))
     place[[int(row[0]) for row in rows], range(len(rows))] = 1.0
     _, amplitude, omega, phase = np.array(rows).T

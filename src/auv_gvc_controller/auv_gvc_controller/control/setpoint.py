@@ -4,7 +4,7 @@ import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -19,16 +19,6 @@ from auv_dynamics.vehicle import DOFS
 COLUMNS = ('t', *DOFS)
 ROUNDING = 1e-10  # s
 STOPPING = 0.2  # m/s2, rad/s2: how a set-point without a duration goes to zero after its file
-
-
-class Setpoint(Protocol):
-    """A set-point as a function of time."""
-
-    def value(self, t: np.ndarray | float) -> np.ndarray:
-        """nu_d at t (...,) s: (..., 6) in m/s and rad/s, body frame."""
-
-    def derivative(self, t: np.ndarray | float) -> np.ndarray:
-        """nu_d_dot at t (...,) s: (..., 6) in m/s2 and rad/s2."""
 
 
 class SetpointTable:
@@ -51,15 +41,18 @@ class SetpointTable:
         return np.clip(k, 0, len(self._slope) - 1)
 
     def value(self, t: np.ndarray | float) -> np.ndarray:
-        """nu_d at t."""
+        """nu_d at t (...,) s: (..., 6) in m/s and rad/s, body frame."""
         t = np.minimum(t, self._t[-1])  # past the end the last value is held
         k = self._segment(t)
         return self._nu_d[k] + self._slope[k] * (t - self._t[k])[..., None]
 
     def derivative(self, t: np.ndarray | float) -> np.ndarray:
-        """Slope of the segment that begins at t."""
+        """nu_d_dot (..., 6): slope of the segment that begins at t, m/s2 and rad/s2."""
         held = np.asarray(t, float) > self._t[-1] + ROUNDING
         return np.where(held[..., None], 0.0, self._slope[self._segment(t)])
+
+
+Setpoint = Harmonics | SetpointTable
 
 
 def load_table(path: Path, duration: float, text: str | None = None) -> SetpointTable:

@@ -47,6 +47,12 @@ def test_a_fault_is_there_from_its_begin_to_before_its_end(begin, end, steps):
     assert_array_equal(np.flatnonzero(found[:, WRENCH]), steps)
 
 
+def test_it_may_begin_with_the_last_step_and_not_later():
+    assert faults({'kind': 'wrench_loss', 'from': 10.0}).entries[0].first == 1000
+    with pytest.raises(InputError, match=r'a time within the run of 10 s, found 10\.01 s'):
+        faults({'kind': 'wrench_loss', 'from': 10.01})
+
+
 def test_without_times_it_is_always_there():
     assert (rows({'kind': 'wrench_loss'})[:, WRENCH] == HELD).all()
 

@@ -66,7 +66,6 @@ class ControllerParameters:
             declare(node, name, list[float], None, text, writable=True)
         self._vehicle = declare(node, 'vehicle', str, '', 'vehicle file, or shipped bare name')
         self._begun = self.settings = ControllerSettings.read(self._declare, node.get_name())
-        self.lockstep = self.settings.lockstep
         self.acceleration = self.settings.setpoint_acceleration
         self.setpoints = self.settings.setpoints()
         self.autostart = declare(node, 'autostart', bool, True, 'configure and activate at once')
@@ -115,7 +114,7 @@ class ControllerParameters:
             SETTINGS_FACT: json.dumps(self.settings.unlike(self._begun), sort_keys=True),
         }
         self.setpoints.believe(*self.settings.believed)
-        if self.lockstep:
+        if self.settings.lockstep:
             self.setpoints.reset()
         else:  # what came to an inactive controller may be of a time that is over
             self.setpoints.forget()
@@ -254,7 +253,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         for service in self.services:
             service.callback = partial(self._answer, service.callback)
         self.create_service(Trigger, '~/reset', self._on_reset)
-        steady_timer(self, WATCH_LOCKSTEP if self._settings.lockstep else WATCH, self._watch)
+        steady_timer(self, WATCH_LOCKSTEP if self.lockstep else WATCH, self._watch)
         if self._settings.autostart:
             self._autostart()
         if self.exit_code is None:
@@ -262,12 +261,12 @@ class ControllerNode(BulkMixin, LifecycleNode):
 
     def _task(self) -> str:
         law = self.get_parameter('law').value or 'a law'
-        pace = 'lock-step' if self._settings.lockstep else 'real time'
+        pace = 'lock-step' if self.lockstep else 'real time'
         return f'tracks {topics.CMD_VEL.name} with {law} in {pace}'
 
     def _subscribe(self) -> None:
         p = self._settings
-        odometry = topics.one_at_a_time() if p.lockstep else topics.newest_measurement()
+        odometry = topics.one_at_a_time() if self.lockstep else topics.newest_measurement()
         self.graph.listen(topics.ODOM, self._on_odometry, odometry)
         self._keep(
             topics.CMD_VEL, lambda ns, nu_d: p.setpoints.setpoint(ns, nu_d, time.monotonic())
@@ -332,11 +331,11 @@ class ControllerNode(BulkMixin, LifecycleNode):
     def _on_odometry(self, ns: int, x: tuple[float, ...]) -> None:
         if self._active:
             self._say(self._controller.odometry(ns, x, self._now()))
-        elif self._settings.lockstep:
+        elif self.lockstep:
             self._missed = ns, x
 
     def _now(self) -> Now:
-        if self._settings.lockstep:
+        if self.lockstep:
             return UNTIMED
         return Now(time.monotonic(), self.get_clock().now().nanoseconds)
 
@@ -356,7 +355,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
             return
         self._held = None if self.graph.ready() else (answer, leaves)
         if self._held is not None:  # until the expected subscribers have matched; see _watch
-            if not self._settings.lockstep:
+            if not self.lockstep:
                 self._controller.unheard()
             return
         if not leaves:
@@ -370,7 +369,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
 
     def _tell(self, trouble: str) -> None:
         """Log when the law engages, and when it disengages."""
-        if trouble and self._settings.lockstep:  # there nothing is late: something has failed
+        if trouble and self.lockstep:  # there nothing is late: something has failed
             self.graph.complain(trouble)
         elif self._follows == bool(trouble):
             self._follows = not trouble
@@ -402,7 +401,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         if not self._active:
             return
         waited_for = self._held is not None or self._controller.unanswered is not None
-        if waited_for or not self._settings.lockstep:
+        if waited_for or not self.lockstep:
             self._say(self._controller.silence(), leaves=True)
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

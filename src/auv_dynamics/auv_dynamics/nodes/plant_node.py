@@ -127,13 +127,11 @@ class RealTime:
 
     """
 
-    ZERO = (0.0,) * 6
-
     def __init__(self, node: Any):
         self._node = node
         self._began: float | None = None
         self._first = 0  # step published at `_began`
-        self._tau: tuple[float, ...] = self.ZERO
+        self._tau: tuple[float, ...] = (0.0,) * 6
         self._heard = -float('inf')
         self._answered = -1
         self._ended: float | None = None
@@ -175,7 +173,7 @@ class RealTime:
 
     def _held(self) -> tuple[float, ...]:
         heard = time.monotonic() - self._heard <= self._node.wrench_timeout
-        return self._tau if heard else self.ZERO
+        return self._tau if heard else (0.0,) * 6
 
     def _tick(self) -> None:
         node, plant = self._node, self._node.plant

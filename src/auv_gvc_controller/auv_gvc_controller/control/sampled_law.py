@@ -186,10 +186,6 @@ def is_compiled(gains: Any) -> bool:
     return JITTED and type(gains) in SHIPPED.values()
 
 
-ZERO = (0.0,) * 6
-UPRIGHT = (1.0, 0.0, 0.0, 0.0)
-
-
 class SampledLaw:
     """A law with its state, one sample at a time.
 
@@ -209,7 +205,8 @@ class SampledLaw:
         self.reset()
         if self._compiled:
             # compile or load the kernel now: the first sample must not wait for it
-            self.sample(0.0, 0.0, ZERO, UPRIGHT, ZERO, ZERO)
+            zero = (0.0,) * 6
+            self.sample(0.0, 0.0, zero, (1.0, 0.0, 0.0, 0.0), zero, zero)
             self.reset()
 
     def reset(self) -> None:

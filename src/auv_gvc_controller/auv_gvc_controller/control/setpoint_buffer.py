@@ -1,7 +1,6 @@
 """Buffer of set-points: the one that belongs to an odometry, and the reference filter."""
 
 import math
-from collections import OrderedDict
 from typing import NamedTuple
 
 import numpy as np
@@ -83,8 +82,8 @@ class Reference(NamedTuple):
     """A set-point: stamp in ns, nu_d and nu_d_dot as six floats each."""
 
     ns: int
-    nu_d: tuple[float, ...]
-    nu_d_dot: tuple[float, ...]
+    nu_d: Six
+    nu_d_dot: Six
 
 
 class SetpointBuffer:
@@ -113,17 +112,17 @@ class SetpointBuffer:
         exact: bool,
         acceleration: str,
         limits: Limits = UNLIMITED,
-        steepest: tuple[float, ...] | None = None,
+        steepest: Six | None = None,
     ):
         self.exact, self._acceleration = exact, acceleration
         self.believe(limits, steepest)
-        self._nu_d: OrderedDict[int, tuple[float, ...]] = OrderedDict()
-        self._nu_d_dot: OrderedDict[int, tuple[float, ...]] = OrderedDict()
+        self._nu_d: dict[int, Six] = {}
+        self._nu_d_dot: dict[int, Six] = {}
         self._used: Reference | None = None
         self._slope_until = 0  # ns
         self.heard, self._left = -math.inf, False
 
-    def believe(self, limits: Limits, steepest: tuple[float, ...] | None) -> None:
+    def believe(self, limits: Limits, steepest: Six | None) -> None:
         """Set the limits of what comes from now on."""
         self._limits, self._steepest = limits, steepest
 
@@ -143,7 +142,7 @@ class SetpointBuffer:
             self._left = True
             self._nu_d_dot.clear()  # now: those of the other may come before his nu_d
 
-    def setpoint(self, ns: int, nu_d: tuple[float, ...], steady: float = 0.0) -> None:
+    def setpoint(self, ns: int, nu_d: Six, steady: float = 0.0) -> None:
         """Keep a set-point that came at `steady` s.
 
         Raises
@@ -158,14 +157,12 @@ class SetpointBuffer:
         self._keep(self._nu_d, ns, nu_d)
         self.heard = steady
 
-    def derivative(self, ns: int, nu_d_dot: tuple[float, ...]) -> None:
+    def derivative(self, ns: int, nu_d_dot: Six) -> None:
         """Keep a derivative; ValueError when it is not believed or not newer than that in use."""
         self._limits.check_acceleration(nu_d_dot)
         self._keep(self._nu_d_dot, ns, nu_d_dot)
 
-    def _keep(
-        self, buffer: OrderedDict[int, tuple[float, ...]], ns: int, values: tuple[float, ...]
-    ) -> None:
+    def _keep(self, buffer: dict[int, Six], ns: int, values: Six) -> None:
         of_now = self._used is None or self._used.ns - ns <= AHEAD
         if self._steepest is not None and of_now and ns < next(reversed(buffer), ns):
             for ahead in (self._nu_d, self._nu_d_dot):
@@ -177,7 +174,7 @@ class SetpointBuffer:
             raise ValueError(f'stamp repeated: expected each stamp once, found {ns} ns again')
         buffer[ns] = values
         if len(buffer) > CAPACITY:
-            buffer.popitem(last=False)
+            del buffer[next(iter(buffer))]
 
     def find(self, ns: int) -> Reference | None:
         """Set-point for an odometry stamped `ns`, or None while there is none."""
@@ -208,7 +205,7 @@ class SetpointBuffer:
         earlier = [stamp for stamp in self._nu_d if stamp <= ns and self._complete(stamp)]
         return max(earlier, default=self._used.ns if self._used else None)
 
-    def _difference(self, chosen: int) -> tuple[float, ...]:
+    def _difference(self, chosen: int) -> Six:
         before = [(stamp, self._nu_d[stamp]) for stamp in self._nu_d if stamp < chosen]
         if self._used is not None:
             before.append((self._used.ns, self._used.nu_d))

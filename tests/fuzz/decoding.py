@@ -43,7 +43,7 @@ def try_messages(data: bytes) -> str:
     pairing = SetpointBuffer(exact=False, acceleration=DIFFERENCE, limits=Limits(20.0, 20.0, 100.0))
     guard = OdometryGuard(
         SECOND, Limits(20.0, 20.0, 100.0), lockstep=False, patience=0.5,
-        age=StampAge('auto', SECOND // 2),
+        age=StampAge('auto', 0.5),
     )  # fmt: skip
     _law.reset()
     controller = VelocityController(

@@ -104,7 +104,7 @@ def test_the_largest_speeds_themselves_are_believed():
 
 
 def aged(clock: str, most: float = 0.5) -> OdometryGuard:
-    age = StampAge(clock, round(most * 1e9))
+    age = StampAge(clock, most)
     return OdometryGuard(100 * MS, Limits(5.0, 2.0), lockstep=False, patience=0.5, age=age)
 
 

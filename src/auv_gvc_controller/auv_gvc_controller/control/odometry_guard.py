@@ -71,12 +71,12 @@ class StampAge:
     clock : that wrote the stamps. 'ros': the node's own, so that the age is their difference;
         'own': a free-running one, so that the age counts from the freshest stamp seen; 'auto': as
         'ros' where both count from the same beginning, else as 'own'
-    most_ns : largest age, ns
+    most : largest age, s
 
     """
 
-    def __init__(self, clock: str, most_ns: int):
-        self._clock, self._most = clock, most_ns / 1e9
+    def __init__(self, clock: str, most: float):
+        self._clock, self._most = clock, most
         self.reset()
 
     def reset(self) -> None:

@@ -170,22 +170,22 @@ class ControllerSettings:
 
         """
         law = SampledLaw(gains, control_model(vehicle), self._reach(vehicle))
-        timeouts = Timeouts(self.odometry_timeout, self.setpoint_timeout)
         live = not self.lockstep
+        timeouts = Timeouts(self.odometry_timeout, self.setpoint_timeout) if live else None
         guard = OdometryGuard(
             round(self.limits_gap * 1e9),
             self.limits,
             self.lockstep,
-            patience=timeouts.odometry if live else 0.0,
-            age=StampAge(self.stamp_clock, round(timeouts.odometry * 1e9)) if live else None,
+            patience=self.odometry_timeout,
+            age=StampAge(self.stamp_clock, self.odometry_timeout) if live else None,
         )
-        ramp = 0.0 if self.lockstep else self.ramp
+        ramp = self.ramp if live else 0.0
         return VelocityController(
             law,
             setpoints,
             guard,
             OutputStage(self._wrench_limit(vehicle), self.limits_wrench_rate, ramp),
-            timeouts=timeouts if live else None,
+            timeouts=timeouts,
             reference_filter=self._reference_filter(),
         )
 

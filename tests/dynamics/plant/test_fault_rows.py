@@ -63,6 +63,8 @@ def test_times_beyond_all_steps_are_never_reached():
     assert make_faults([late], ['a'], setting).entries[0].end == END
     with pytest.raises(InputError, match='a step between from'):
         make_faults([{'kind': 'wrench_loss', 'from': 1e299, 'to': 1e300}], ['a'], setting)
+    with pytest.raises(InputError, match=r'a step between from .*, found nothing'):
+        make_faults([{'kind': 'wrench_loss', 'from': 1e299}], ['a'], setting)
     with pytest.raises(InputError, match='at most 1000000 steps'):
         make_faults([{'kind': 'sensor_delay', 'delay': 1.0}], ['a'], setting)
 

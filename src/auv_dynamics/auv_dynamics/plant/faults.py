@@ -181,7 +181,7 @@ def _interval(spec: Mapping[str, Any], place: str, setting: FaultSetting) -> tup
     last = END if end is None else _step_at(float(end), setting)
     if first == last:
         expected = f'a step between from ({begin:g} s) and to, steps are {setting.step:g} s apart'
-        raise InputError(setting.file, f'{place}.to', expected, f'{end:g} s')
+        raise InputError(setting.file, f'{place}.to', expected, end and f'{end:g} s')
     return first, last
 
 

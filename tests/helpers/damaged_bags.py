@@ -19,14 +19,17 @@ from auv_analysis.bag.writer import BagWriter
 
 STEP = 10_000_000
 UPRIGHT = [0, 0, 0, 1, *[0] * 9]
-NEVER = {'sec': 9223372036, 'nsec': 854775807}
-QOS = [
-    {
-        'history': 'keep_last', 'depth': 3000, 'reliability': 'reliable', 'durability': 'volatile',
-        'deadline': NEVER, 'lifespan': NEVER, 'liveliness': 'automatic',
-        'liveliness_lease_duration': NEVER, 'avoid_ros_namespace_conventions': False,
-    }
-]  # fmt: skip
+QOS = """\
+- history: keep_last
+  depth: 3000
+  reliability: reliable
+  durability: volatile
+  deadline: {sec: 9223372036, nsec: 854775807}
+  lifespan: {sec: 9223372036, nsec: 854775807}
+  liveliness: automatic
+  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
+  avoid_ros_namespace_conventions: false
+"""
 ATTACHED = {'scenario.yaml': 'name: made\n', '../escape.yaml': 'a: 1\n', 'params.yaml': 'x: {}\n'}
 Row = tuple[str, int, bytes]
 

@@ -152,12 +152,7 @@ def written_again(bag: Path, folder: Path, storage: Storage) -> Path:
     with mcap_of(bag).open('rb') as stream:
         for schema, channel, message in make_reader(stream).iter_messages(log_time_order=False):
             if not writer.has_channel(channel.topic):
-                qos = yaml.safe_load(channel.metadata['offered_qos_profiles'])
-                digest = channel.metadata['topic_type_hash']
-                text = schema.data.decode()
-                writer.add_channel(
-                    Definition(channel.topic, schema.name, qos=qos, digest=digest), text
-                )
+                writer.add_channel(Definition.of(channel, schema), schema.data.decode())
             writer.write(channel.topic, message.log_time, message.data)
     writer.close()
     return folder

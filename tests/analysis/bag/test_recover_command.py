@@ -34,7 +34,7 @@ from mcap.stream_reader import breakup_chunk
 from auv_analysis.bag import inspection
 from auv_analysis.bag import recover as recovery
 from auv_analysis.bag.inspection import Definitions, Spacing
-from auv_analysis.bag.metadata import Definition, FileExtent, metadata
+from auv_analysis.bag.metadata import Definition, FileExtent, metadata, offered_profiles
 from auv_analysis.bag.output import Storage
 from auv_analysis.bag.reading import read_bag
 from auv_analysis.bag.recover import recover
@@ -283,7 +283,7 @@ def test_policies_are_read_up_to_a_size_of_all_together(monkeypatch: pytest.Monk
         known.add(Channel(9, '/a', 'cdr', {}, 1), 0)
         monkeypatch.setattr(inspection, 'LARGEST_POLICIES', size + len('- {depth: 3}') + more)
         found = known.of_rosbag2()
-        assert [one.qos for one in found] == [
+        assert [offered_profiles(one.qos) for one in found] == [
             [{'depth': 1}], [{'depth': 25}], [{'depth': 1}], [], [], [], last, []
         ]  # fmt: skip
         assert [(one.topic, one.digest) for one in found[:2]] == [('/a', '0'), ('/b', '1')]

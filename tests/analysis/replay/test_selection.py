@@ -6,11 +6,12 @@ from types import SimpleNamespace
 
 import pytest
 
+from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.step_topics import ODOMETRY, TWIST, WRENCH
 from auv_analysis.cli import replay
 from auv_analysis.cli.main import parser
 from auv_analysis.graph import domain
-from auv_analysis.replay.played_bag import BagIndex, PlayedTopic
+from auv_analysis.replay.played_bag import BagIndex
 from auv_analysis.replay.selection import ReplaySettings, is_command, select
 from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.ros import interface
@@ -39,7 +40,7 @@ COMMANDS = {'/wrench', '/cmd_vel', '/cmd_accel'}
 
 
 def index(kinds: dict[str, str] = KINDS, encoding: str = 'cdr') -> BagIndex:
-    topics = {topic: PlayedTopic(kind, encoding) for topic, kind in kinds.items()}
+    topics = {topic: Definition(topic, kind, encoding) for topic, kind in kinds.items()}
     return BagIndex(Path('bag'), topics=topics)
 
 

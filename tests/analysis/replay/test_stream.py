@@ -10,8 +10,9 @@ from helpers.strategies import examples
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
+from auv_analysis.bag.metadata import Definition
 from auv_analysis.replay import played_bag
-from auv_analysis.replay.played_bag import PlayedTopic, index_bag, messages
+from auv_analysis.replay.played_bag import index_bag, messages
 from auv_dynamics.files.errors import InputError
 
 TOPICS = ('/a', '/b', '/c')
@@ -51,7 +52,6 @@ def test_by_log_time_and_then_as_in_the_bag(tmp_path, files, topics, begin, end,
     assert (index.first, index.last) == (
         min(ns for ns, *_ in everything), max(ns for ns, *_ in everything)
     )  # fmt: skip
-    assert sum(index.counts.values()) == len(everything)
 
 
 @pytest.mark.parametrize('beside', [False, True], ids=['one file', 'two files of the same time'])
@@ -113,7 +113,8 @@ def test_a_bag_that_grows_is_played_up_to_where_it_was(tmp_path: Path) -> None:
     (tmp_path / 'bag_0.mcap').write_bytes(whole[: len(whole) // 2])
     index = index_bag(tmp_path)
     assert 'not finished' in index.notes[0]
-    known = sum(index.counts.values())
+    known = index.last + 1
+    assert 0 < known < 50
     (tmp_path / 'bag_0.mcap').write_bytes(whole)
     assert [one.ns for one in messages(index, TOPICS, end=index.last)] == list(range(known))
 
@@ -153,7 +154,7 @@ def test_says_how_a_topic_was_recorded(tmp_path: Path) -> None:
     index = index_bag(tmp_path)
     assert index.topics['/a'].kind == STRING
     assert index.clashes == {'/a'}
-    assert index.topics['/qos'] == PlayedTopic('', 'cdr', text, known)
+    assert index.topics['/qos'] == Definition('/qos', '', 'cdr', text, known)
 
 
 @pytest.mark.parametrize(

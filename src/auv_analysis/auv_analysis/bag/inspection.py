@@ -3,7 +3,7 @@
 import heapq
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from zstandard import FRAME_HEADER
 
 from auv_analysis.bag.chunks import MessageTable, by_channel
 from auv_analysis.bag.mcap_file import Lost, McapFile, MessageIndex, Read
-from auv_analysis.bag.metadata import Definition, FileExtent, offered_profiles
+from auv_analysis.bag.metadata import Definition, FileExtent
 from auv_analysis.bag.step_topics import role_of
 from auv_dynamics.ros.interface import NANOSECONDS, OPTIONAL_STEP_TOPICS, STEP_TOPICS
 
@@ -67,20 +67,14 @@ class Definitions:
     def of_rosbag2(self) -> list[Definition] | None:
         """The topics for a metadata.yaml; None where not all are as rosbag2 writes them."""
         found: dict[str, Definition] = {}
-        known: dict[str, list[Any]] = {}
         left = LARGEST_POLICIES
         for channel in self.channels():
             schema = self.schema_of(channel)
             if channel.message_encoding != 'cdr' or schema is None:
                 return None
-            digest = channel.metadata.get('topic_type_hash', '')
-            text = channel.metadata.get('offered_qos_profiles', '')
-            left -= len(text)
-            if text not in known and left >= 0:
-                known[text] = offered_profiles(text)
-            qos = known[text] if left >= 0 else []
-            definition = Definition(channel.topic, schema.name, qos=qos, digest=digest)
-            found.setdefault(channel.topic, definition)
+            one = Definition.of(channel, schema)
+            left -= len(one.qos)
+            found.setdefault(channel.topic, one if left >= 0 else replace(one, qos=''))
         return [*found.values()]
 
 

@@ -3,14 +3,18 @@
 import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
 from auv_analysis.output.new_files import replacing
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import parse_any_yaml, parse_yaml, yaml_text
+
+if TYPE_CHECKING:
+    from mcap.records import Channel, Schema
 
 DISTRO = 'jazzy'
 BAG = 'a bag: a folder, an .mcap, a .db3 or a ROS 1 .bag file, or a .csv, .tlog or .BIN file'
@@ -30,17 +34,29 @@ class Definition:
     ----------
     topic : full name
     kind : message type, 'package/msg/Name'
-    encoding : of its messages
-    qos : offered profiles as rosbag2 writes them
-    digest : RIHS01 type hash
+    encoding : of its messages, 'cdr' for ROS 2
+    qos : offered profiles as rosbag2 writes them, a YAML text; empty: not known
+    digest : RIHS01 type hash; empty where it is not known
 
     """
 
     topic: str
     kind: str
     encoding: str = 'cdr'
-    qos: list[Any] = field(default_factory=list)
+    qos: str = ''
     digest: str = ''
+
+    @classmethod
+    def of(cls, channel: 'Channel', schema: 'Schema | None') -> 'Definition':
+        """Topic of a channel."""
+        about = channel.metadata
+        return cls(
+            channel.topic,
+            schema.name if schema else '',
+            channel.message_encoding,
+            about.get('offered_qos_profiles', ''),
+            about.get('topic_type_hash', ''),
+        )
 
 
 @dataclass
@@ -132,7 +148,7 @@ def _about(definition: Definition) -> dict[str, Any]:
         'name': definition.topic,
         'type': definition.kind,
         'serialization_format': definition.encoding,
-        'offered_qos_profiles': definition.qos,
+        'offered_qos_profiles': offered_profiles(definition.qos),
         'type_description_hash': definition.digest,
     }
 
@@ -155,13 +171,9 @@ def as_text(document: Mapping[str, Any]) -> str:
     return yaml.dump({ROOT: document}, Dumper=_Dumper, sort_keys=False)
 
 
-def qos_text(qos: list[Any]) -> str:
-    """Offered profiles as they stand in the metadata of a channel."""
-    return yaml.dump(qos, Dumper=_Dumper, default_flow_style=False, sort_keys=False)
-
-
+@lru_cache(64)  # topics mostly offer the same
 def offered_profiles(text: str) -> list[Any]:
-    """QoS profiles as `qos_text` writes them; none of a text without any, or that names itself."""
+    """QoS profiles of a `Definition`; none of a text without any, or that names itself."""
     if '*' in text:
         return []
     try:

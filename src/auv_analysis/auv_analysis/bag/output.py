@@ -13,7 +13,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, McapRecord, Schema
 from mcap.writer import CompressionType, Writer
 
-from auv_analysis.bag.metadata import Definition, FileExtent, as_text, metadata, qos_text
+from auv_analysis.bag.metadata import Definition, FileExtent, as_text, metadata
 from auv_analysis.output.new_files import NEW
 
 COMPRESSIONS = {
@@ -199,17 +199,14 @@ class BagFile:
         if kind not in self._schemas:
             self._schemas[kind] = self._writer.register_schema(kind, 'ros2msg', text)
             self._put(Schema(self._schemas[kind], text, 'ros2msg', kind))
-        about = {
-            'offered_qos_profiles': qos_text(definition.qos),
-            'topic_type_hash': definition.digest,
-        }
+        about = {'offered_qos_profiles': definition.qos, 'topic_type_hash': definition.digest}
         known = definition.topic, definition.encoding
         number = self._writer.register_channel(*known, self._schemas[kind], about)
         self._put(Channel(number, *known, about, self._schemas[kind]))
         self._channels[definition.topic] = number
         self._definitions.append(definition)
         self.extent.counts[definition.topic] = 0
-        self._ending += PER_TOPIC + 2 * len(about['offered_qos_profiles'])
+        self._ending += PER_TOPIC + 2 * len(definition.qos)
 
     def _put(self, record: McapRecord) -> None:
         builder = RecordBuilder()

@@ -13,6 +13,7 @@ from auv_analysis.bag.ros2msg import schema_text
 from auv_analysis.bag.writer import RecordingError
 from auv_analysis.graph.node_settings import RecorderSettings
 from auv_analysis.nodes.recorder import EPOCH, GraphClock, OtherTopics, make_wanted, make_writer
+from auv_dynamics.files.yaml_files import yaml_text
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.ros.interface import RECORDER, BadMessageError
@@ -230,7 +231,7 @@ class RecorderNode(BulkNode):
             return
         found = self.get_publishers_info_by_topic(topic)
         offered = [one for one in found if one.topic_type == kind]
-        qos = [qos_entry(one.qos_profile) for one in offered]
+        qos = yaml_text([qos_entry(one.qos_profile) for one in offered], default_flow_style=False)
         known = [*offered, *self.get_subscriptions_info_by_topic(topic)]
         digest = next((str(one.topic_type_hash) for one in known), '')
         definition = Definition(topic, kind, qos=qos, digest=digest)

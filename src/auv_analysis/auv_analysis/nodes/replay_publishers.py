@@ -17,10 +17,9 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from auv_analysis.bag.metadata import offered_profiles
+from auv_analysis.bag.metadata import Definition, offered_profiles
 from auv_analysis.bag.ros2msg import definition
 from auv_analysis.bag.step_topics import ODOMETRY, role_of
-from auv_analysis.replay.played_bag import PlayedTopic
 from auv_analysis.replay.selection import Selection
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface, topics
@@ -32,14 +31,14 @@ from auv_dynamics.ros.topics import Topic, message_class
 
 
 def make_publishers(
-    graph: NodeInterface, recorded: dict[str, PlayedTopic], selection: Selection
+    graph: NodeInterface, recorded: dict[str, Definition], selection: Selection
 ) -> dict[str, Any]:
     """Publishers by recorded name; what cannot be published moves to `selection.left_out`.
 
     Parameters
     ----------
     graph : of the node
-    recorded : recorded name -> how it was recorded
+    recorded : recorded name -> its definition
     selection : of the topics
 
     """

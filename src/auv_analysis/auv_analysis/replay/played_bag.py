@@ -13,7 +13,7 @@ from mcap.records import Channel
 
 from auv_analysis.bag.chunks import MessageTable
 from auv_analysis.bag.mcap_file import McapFile
-from auv_analysis.bag.metadata import bag_files
+from auv_analysis.bag.metadata import Definition, bag_files
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.interface import NANOSECONDS
 
@@ -22,25 +22,6 @@ NEVER = 1 << 64  # ns, later than every log time
 LATEST = (1 << 31) * NANOSECONDS  # of a ROS time
 MOST_SPANS = 1000  # of a topic that are told apart
 Span = tuple[int, int]  # ns, first and last log time
-
-
-@dataclass(frozen=True)
-class PlayedTopic:
-    """Recording of a topic.
-
-    Attributes
-    ----------
-    kind : message type, 'package/msg/Name'
-    encoding : of its messages, 'cdr' for ROS 2
-    qos : offered profiles as rosbag2 writes them, a YAML text
-    digest : RIHS01 type hash; empty where it was not recorded
-
-    """
-
-    kind: str
-    encoding: str
-    qos: str = ''
-    digest: str = ''
 
 
 @dataclass
@@ -52,8 +33,7 @@ class BagIndex:
     bag : its folder or file
     files : file, in the order of the recording -> an entry per table of messages: the earliest log
         time in it or behind it, ns
-    topics : recorded name -> how it was recorded
-    counts : recorded name -> number of messages
+    topics : recorded name -> its first definition
     first, last : log times in ns
     spans : recorded name -> log times of it without a gap in between, in the order of the bag
     clashes : topics that were recorded in more than one way
@@ -63,8 +43,7 @@ class BagIndex:
 
     bag: Path
     files: dict[Path, list[int]] = field(default_factory=dict)
-    topics: dict[str, PlayedTopic] = field(default_factory=dict)
-    counts: dict[str, int] = field(default_factory=dict)
+    topics: dict[str, Definition] = field(default_factory=dict)
     spans: dict[str, list[Span]] = field(default_factory=dict)
     first: int = NEVER
     last: int = -1
@@ -109,34 +88,18 @@ def _indexed(path: Path, index: BagIndex) -> list[int]:
     file, earliest = McapFile(path, index.notes), list[int]()
     for item in file.records():
         if isinstance(item, MessageTable):
-            _count(item, file, index)
             earliest.append(int(item.log_times.min()))
+            index.first = min(index.first, earliest[-1])
+            index.last = max(index.last, int(item.log_times.max()))
+            for channel, numbers in file.by_channel(item):
+                _span(index.spans.setdefault(channel.topic, []), item.log_times[numbers])
         elif isinstance(item, Channel):
-            _meet(item, file, index)
+            found = Definition.of(item, file.schema_of(item))
+            known = index.topics.setdefault(item.topic, found)
+            if (known.kind, known.encoding) != (found.kind, found.encoding):
+                index.clashes.add(item.topic)
     least = np.minimum.accumulate(np.array(earliest[::-1], np.uint64))[::-1]
     return [int(ns) for ns in least]
-
-
-def _meet(channel: Channel, file: McapFile, index: BagIndex) -> None:
-    schema, about = file.schema_of(channel), channel.metadata
-    topic = PlayedTopic(
-        schema.name if schema else '',
-        channel.message_encoding,
-        about.get('offered_qos_profiles', ''),
-        about.get('topic_type_hash', ''),
-    )
-    known = index.topics.setdefault(channel.topic, topic)
-    if (known.kind, known.encoding) != (topic.kind, topic.encoding):
-        index.clashes.add(channel.topic)
-
-
-def _count(table: MessageTable, file: McapFile, index: BagIndex) -> None:
-    for channel, messages in file.by_channel(table):
-        topic = channel.topic
-        index.counts[topic] = index.counts.get(topic, 0) + len(messages)
-        _span(index.spans.setdefault(topic, []), table.log_times[messages])
-    index.first = min(index.first, int(table.log_times.min()))
-    index.last = max(index.last, int(table.log_times.max()))
 
 
 def _span(spans: list[Span], times: np.ndarray) -> None:

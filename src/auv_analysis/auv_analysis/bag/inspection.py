@@ -2,7 +2,7 @@
 
 import heapq
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -31,38 +31,32 @@ class Definitions:
     """The most trustworthy definition of each id."""
 
     def __init__(self) -> None:
-        self._schemas: dict[int, tuple[int, Schema]] = {}
-        self._channels: dict[int, tuple[int, Channel]] = {}
+        self._known: dict[tuple[type, int], tuple[int, Schema | Channel]] = {}
         self.doubtful: set[str] = set()  # topics or types that are defined differently elsewhere
 
     def add(self, record: Schema | Channel, trust: int) -> None:
         """Take a definition, of which `trust` says where it stands."""
-        if isinstance(record, Schema):
-            self._add(self._schemas, record, trust, record.name)
-        else:
-            self._add(self._channels, record, trust, record.topic)
-
-    def _add(self, known: dict[int, Any], record: Schema | Channel, trust: int, name: str) -> None:
-        old = known.get(record.id)
-        if old is not None and old[1] != record:
-            self.doubtful.add(name)
-        if old is None or old[0] < trust:
-            known[record.id] = trust, record
+        key = type(record), record.id
+        best, known = self._known.get(key, (-1, record))
+        if known != record:
+            self.doubtful.add(record.name if isinstance(record, Schema) else record.topic)
+        if best < trust:
+            self._known[key] = trust, record
 
     def channel(self, number: int) -> Channel | None:
         """Channel of an id."""
-        found = self._channels.get(number)
-        return found[1] if found else None
+        _, found = self._known.get((Channel, number), (0, None))
+        return found if isinstance(found, Channel) else None
 
     def schema_of(self, channel: Channel) -> Schema | None:
         """Schema of a channel."""
-        found = self._schemas.get(channel.schema_id)
-        return found[1] if found else None
+        _, found = self._known.get((Schema, channel.schema_id), (0, None))
+        return found if isinstance(found, Schema) else None
 
-    def channels(self) -> Iterator[Channel]:
+    def channels(self) -> list[Channel]:
         """All channels, by their ids."""
-        for _, (_, channel) in sorted(self._channels.items()):
-            yield channel
+        every = (record for _, record in self._known.values() if isinstance(record, Channel))
+        return sorted(every, key=lambda channel: channel.id)
 
     def of_rosbag2(self) -> list[Definition] | None:
         """The topics for a metadata.yaml; None where not all are as rosbag2 writes them."""
@@ -78,54 +72,51 @@ class Definitions:
         return [*found.values()]
 
 
+@dataclass
 class Spacing:
     """Intervals between the stamps of a topic, in the order of the bag.
 
     Attributes
     ----------
     first, last, earliest, latest : stamps in ns, in the order of the bag and by their size
-    count : number of stamps
+    count : number of stamps; without any, those mean nothing
     intervals : ns -> how often
     longest : the longest of them, and where they begin, ns
 
     """
 
-    def __init__(self) -> None:
-        self.first: int | None = None
-        self.last: int | None = None
-        self.earliest: int | None = None
-        self.latest: int | None = None
-        self.count = 0
-        self.intervals: Counter[int] = Counter()
-        self.longest: list[tuple[int, int]] = []  # interval and where it begins, ns
+    first: int = 0
+    last: int = 0
+    earliest: int = 0
+    latest: int = 0
+    count: int = 0
+    intervals: Counter[int] = field(default_factory=Counter)
+    longest: list[tuple[int, int]] = field(default_factory=list)
 
     def add(self, stamps: np.ndarray) -> None:
-        """Take the next stamps (n,), ns."""
-        if not len(stamps):
-            return
-        part, apart = Spacing(), np.diff(stamps)
-        part.first, part.last, part.count = int(stamps[0]), int(stamps[-1]), len(stamps)
-        part.earliest, part.latest = int(stamps.min()), int(stamps.max())
+        """Take the next stamps (n,), ns, of which there must be some."""
+        apart = np.diff(stamps)
         values, counts = (found.tolist() for found in np.unique(apart, return_counts=True))
-        part.intervals = Counter(dict(zip(values, counts, strict=True)))
-        part.longest = [(int(apart[i]), int(stamps[i])) for i in np.argsort(apart)[-SHOWN:]]
-        self.join(part)
+        intervals = Counter(dict(zip(values, counts, strict=True)))
+        longest = [(int(apart[i]), int(stamps[i])) for i in np.argsort(apart)[-SHOWN:]]
+        first, last, earliest, latest = (
+            int(ns) for ns in (stamps[0], stamps[-1], stamps.min(), stamps.max())
+        )
+        self.join(Spacing(first, last, earliest, latest, len(stamps), intervals, longest))
 
     def join(self, other: 'Spacing') -> None:
         """Go on with what comes next of the topic."""
-        if other.first is None or other.earliest is None or other.latest is None:
+        if not other.count:
             return
-        if self.last is not None:
+        if self.count:
             between = other.first - self.last
             self._note(between, 1)
             self._keep(between, self.last)
+            self.earliest = min(self.earliest, other.earliest)
+            self.latest = max(self.latest, other.latest)
         else:
-            self.first = other.first
+            self.first, self.earliest, self.latest = other.first, other.earliest, other.latest
         self.count += other.count
-        self.earliest = min(
-            other.earliest, other.earliest if self.earliest is None else self.earliest
-        )
-        self.latest = max(other.latest, other.latest if self.latest is None else self.latest)
         self.last = other.last
         for value, count in other.intervals.items():
             self._note(value, count)
@@ -234,7 +225,7 @@ class Inspection:
         extent = FileExtent(name)
         for number, spacing in self.spacings.items():
             channel = self.definitions.channel(number)
-            if channel is not None and spacing.earliest is not None and spacing.latest is not None:
+            if channel is not None:
                 extent.add(channel.topic, spacing.earliest, spacing.latest, spacing.count)
         return extent
 
@@ -330,16 +321,16 @@ class Report:
     def document(self) -> dict[str, Any]:
         """As `--json` prints it."""
         topics = _topics(file.inspection for file in self.files)
-        spans = [s for _, s in topics.values() if s.earliest is not None]
-        first = min((s.earliest for s in spans if s.earliest is not None), default=None)
-        last = max((s.latest for s in spans if s.latest is not None), default=None)
+        spans = [spacing for _, spacing in topics.values() if spacing.count]
+        first = min((spacing.earliest for spacing in spans), default=0)
+        last = max((spacing.latest for spacing in spans), default=0)
         lost = [file.inspection.messages_lost for file in self.files]
         return {
             'bag': self.bag,
             'changed': self.changed,
             'files': [file.document() for file in self.files],
             'metadata': self.metadata,
-            'duration': None if first is None or last is None else (last - first) / NANOSECONDS,
+            'duration': (last - first) / NANOSECONDS if spans else None,
             'messages': sum(file.inspection.count for file in self.files),
             'messages_lost': None if None in lost else sum(n for n in lost if n is not None),
             'topics': {

@@ -36,14 +36,11 @@ def survey_of_log(path: Path) -> BagContents:
 
 def messages_of_log(path: Path, topics: Collection[str], notes: list[str]) -> Iterator[Message]:
     """Messages of some topics, in the order of the log; `notes` gets what was damaged."""
-    tallies: dict[str, TopicExtent] = {}
     with _opened(path) as log:
-        log.tallies([])
-        for topic, stamp, message in log.messages(topics, notes):
-            tallies.setdefault(topic, TopicExtent(stamp)).add(stamp)
-            yield topic, stamp, message
+        tallies = log.tallies([])
+        yield from log.messages(topics, notes)
     for topic, tally in tallies.items():
-        notes += too_slow(topic, tally)
+        notes += too_slow(topic, tally) if topic in topics else []
 
 
 def too_slow(topic: str, tally: TopicExtent) -> list[str]:

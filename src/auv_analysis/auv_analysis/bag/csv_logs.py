@@ -6,7 +6,7 @@ import math
 import os
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from itertools import chain, islice
+from itertools import chain, islice, repeat
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -85,7 +85,7 @@ def column_spans(table: 'Table', notes: list[str]) -> dict[str, Span]:
     return {name: span for name, span in spans.items() if span.filled}
 
 
-class Table:
+class Table(contextlib.AbstractContextManager['Table']):
     """A CSV file whose head is read: separator, names of the columns, and their units if told.
 
     Parameters
@@ -116,10 +116,6 @@ class Table:
         except BaseException:
             self._stream.close()
             raise
-
-    def __enter__(self) -> 'Table':
-        """Nothing to do."""
-        return self
 
     def __exit__(self, *_: object) -> None:
         """Close the file."""
@@ -256,24 +252,11 @@ class Table:
                 return float(cell.replace(',', '.'))
             raise
 
-    def numbers(self, cells: Sequence[str]) -> np.ndarray:
-        """Numbers (n,) of cells as `number` reads them."""
-        try:
-            return np.array(cells, float)
-        except ValueError:  # an empty one among them
-            return np.array([self.number(cell) for cell in cells])
-
-    def is_cell(self, cell: str) -> bool:
-        """Whether a cell has a number or nothing."""
-        try:
-            self.number(cell)
-        except ValueError:
-            return False
-        return True
-
     def is_number(self, cell: str) -> bool:
         """Whether a cell has a number."""
-        return self.is_cell(cell) and not math.isnan(self.number(cell))
+        with contextlib.suppress(ValueError):
+            return not math.isnan(self.number(cell))
+        return False
 
 
 class Block:
@@ -303,14 +286,18 @@ class Block:
         else:
             texts = [cells[place] for cells in self._cells]
             try:
-                found = self.table.numbers(texts)
-            except ValueError:
-                i = next(i for i, text in enumerate(texts) if not self.table.is_cell(text))
-                where = f'line {self.lines[i]}, column {name}'
-                expected = 'a number, or nothing'
-                raise InputError(self.table.file, where, expected, texts[i]) from None
+                found = np.array(texts, float)
+            except ValueError:  # an empty one among them
+                found = np.array([*map(self._number, texts, self.lines, repeat(name))])
         self._columns[name] = found
         return found
+
+    def _number(self, text: str, line: int, name: str) -> float:
+        try:
+            return self.table.number(text)
+        except ValueError:
+            where = f'line {line}, column {name}'
+            raise InputError(self.table.file, where, 'a number, or nothing', text) from None
 
     def first(self) -> SimpleNamespace:
         """The first line as a message whose fields are the columns of numbers."""

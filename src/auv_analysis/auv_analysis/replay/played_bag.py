@@ -18,7 +18,7 @@ from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.interface import NANOSECONDS
 
 GAP = 60 * NANOSECONDS  # ns without a message, from which it is a gap
-NEVER = 1 << 64  # ns, later than every log time
+NEVER = (1 << 64) - 1  # ns, the latest of all log times
 LATEST = (1 << 31) * NANOSECONDS  # of a ROS time
 MOST_SPANS = 1000  # of a topic that are told apart
 Span = tuple[int, int]  # ns, first and last log time
@@ -140,27 +140,21 @@ def messages(
     begin, end : first and last log time, ns
 
     """
-    heap: list[tuple[int, int, PlayedMessage | None]] = []
-    sources: dict[int, Iterator[PlayedMessage]] = {}
-    for number, (file, least) in enumerate(index.files.items()):
-        if least and least[0] <= end:
-            sources[number] = _of_file(file, least, topics, begin, end)
-            heap.append((least[0], number, None))
-    heapq.heapify(heap)
-    while heap:
-        _, number, message = heap[0]
-        if message is not None:
+    sources = [
+        _of_file(file, least, topics, begin, end)
+        for file, least in index.files.items()
+        if least and least[0] <= end
+    ]
+    for message in heapq.merge(*sources, key=lambda message: message.ns):
+        if message.topic:
             yield message
-        following = next(sources[number], None)
-        if following is None:
-            heapq.heappop(heap)
-        else:
-            heapq.heapreplace(heap, (following.ns, number, following))
 
 
 def _of_file(
     file: Path, least: Sequence[int], topics: Collection[str], begin: int, end: int
 ) -> Iterator[PlayedMessage]:
+    """Messages of a file by log time, behind one of no topic, before which it is not opened."""
+    yield PlayedMessage(least[0], '', b'')
     waiting: list[tuple[int, int, PlayedMessage]] = []
     opened = McapFile(file)
     tables, order = 0, itertools.count()
@@ -168,18 +162,14 @@ def _of_file(
         if not isinstance(item, MessageTable):
             continue
         tables += 1
-        for i in _inside(item, begin, end):
+        times = item.log_times
+        for i in np.flatnonzero((times >= begin) & (times <= end)).tolist():
             topic = opened.channels[int(item.channels[i])].topic
             if topic in topics:
-                message = PlayedMessage(int(item.log_times[i]), topic, item.message(i))
+                message = PlayedMessage(int(times[i]), topic, item.message(i))
                 heapq.heappush(waiting, (message.ns, next(order), message))
         sure = least[tables] if tables < len(least) else math.inf
         while waiting and waiting[0][0] <= sure:
             yield heapq.heappop(waiting)[2]
         if sure > end:
             break  # also where the file has grown since it was indexed
-
-
-def _inside(table: MessageTable, begin: int, end: int) -> list[int]:
-    times = table.log_times
-    return np.flatnonzero((times >= begin) & (times <= min(end, NEVER - 1))).tolist()

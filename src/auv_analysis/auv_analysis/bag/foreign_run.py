@@ -21,12 +21,7 @@ from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.foreign_checks import contradictions
 from auv_analysis.bag.foreign_fields import EULER, FORCE, TORQUE
 from auv_analysis.bag.foreign_messages import read_sources
-from auv_analysis.bag.foreign_topics import (
-    MOTION,
-    SHOWN,
-    TopicMap,
-    candidates,
-)
+from auv_analysis.bag.foreign_topics import MOTION, SHOWN, TopicMap, candidates
 from auv_analysis.bag.foreign_tracks import tracks_of, unknown_angles
 from auv_analysis.bag.load import Recording
 from auv_analysis.bag.tracks import (
@@ -203,12 +198,6 @@ def resistance(vehicle: Vehicle, nu: np.ndarray, attitude: np.ndarray) -> np.nda
         plain(restoring)(model, tuple(attitude.T)),
     )
     return np.sum([np.stack(np.broadcast_arrays(*term), axis=1) for term in terms], axis=0)
-
-
-HOW = {
-    'pose': 'position by straight lines, attitude by slerp',
-    'twist': 'velocity by straight lines between its samples',
-}
 
 
 def load_foreign(bag: str | Path, mapping: TopicMap) -> Recording:
@@ -389,13 +378,14 @@ def _time_spans(tracks: Iterable[Track]) -> str:
 
 
 def _between(role: str, track: Track, step: int) -> str:
+    name = role.replace('_', ' ')
     if role == 'pose':
-        return f'{HOW[role]}'
+        return 'position by straight lines, attitude by slerp'
     if track.is_averaged(step):
-        return f'{role.replace("_", " ")} by its mean over each step, against aliasing'
+        return f'{name} by its mean over each step, against aliasing'
     if track.held:
-        return f'{role.replace("_", " ")} held until the next message'
-    return HOW.get(role, f'{role.replace("_", " ")} by straight lines')
+        return f'{name} held until the next message'
+    return f'{"velocity" if role == "twist" else name} by straight lines between its samples'
 
 
 def _counted(number: int, word: str) -> str:

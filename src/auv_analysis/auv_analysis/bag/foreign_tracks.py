@@ -14,18 +14,9 @@ from auv_analysis.bag.foreign_messages import (
     on_the_clock,
     ordered,
 )
-from auv_analysis.bag.foreign_topics import FROM_ATTITUDE, HELD, MOVING, MappedTopic, TopicMap
+from auv_analysis.bag.foreign_topics import FROM_ATTITUDE, HELD, MOVING, TopicMap
 from auv_analysis.bag.reading import usual_limit
-from auv_analysis.bag.tracks import (
-    BURST,
-    ENOUGH,
-    Track,
-    assembled,
-    at_times,
-    between_gaps,
-    in_seconds,
-    jumps,
-)
+from auv_analysis.bag.tracks import BURST, ENOUGH, Track, assembled, at_times, between_gaps, jumps
 from auv_analysis.metrics.local_polynomials import SMALLEST, rates
 from auv_analysis.metrics.pose_twist import CONJUGATE, turn, turned
 from auv_dynamics.files.errors import InputError
@@ -42,7 +33,6 @@ from auv_dynamics.vehicle.frames import (
 from auv_dynamics.vehicle.thruster_curves import ThrusterCurve, load_curve
 from auv_dynamics.vehicle.vehicle import Vehicle
 
-FRAMES = ('child', 'world')  # in which a velocity may be written
 POSE, TWIST = slice(0, 7), slice(7, 13)  # of an odometry's row
 BURSTS = 0.2  # share of intervals of a burst that makes bursts
 _SWAPS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -86,9 +76,12 @@ def tracks_of(
     if lacking and (by_attitude or mapping.rates == FROM_ATTITUDE):
         expected = 'all three angles, since rates: or twist_frame: world need them'
         raise InputError(bag, 'pose', expected, f'none for {", ".join(lacking)}')
-    moving = [(*one, pose, one[0].source.twist_frame) for one in by_role.pop('twist')]
-    twists = [_velocity(*one) for one in moving]
-    instead = [_without_rates(_velocity(*one[:3], _other(one[3]))) for one in moving]
+    moving = by_role.pop('twist')
+    twists = [_velocity(*one, pose, one[0].source.twist_frame == 'world') for one in moving]
+    instead = [
+        _without_rates(_velocity(*one, pose, one[0].source.twist_frame == 'child'))
+        for one in moving
+    ]
     if mapping.rates == FROM_ATTITUDE:
         others = [_without_rates(one) for one in twists[1:] if one.given[:3].any()]
         twists = [with_rates(twists[0], pose, notes), *others]
@@ -132,10 +125,6 @@ def _by_role(
             rows = np.full((len(one.rows), len(COMPONENTS[role])), np.nan)
             by_role[role] = [(replace(one, rows=rows), told)]
     return by_role
-
-
-def _other(frame: str) -> str:
-    return FRAMES[1 - FRAMES.index(frame)]
 
 
 def _without_rates(twist: Track) -> Track:
@@ -215,13 +204,13 @@ def _said(axes: Mapping[str, str], found: Mapping[str, Recorded]) -> str:
 def _track(role: str, one: Recorded, axes: str, rows: np.ndarray | None = None) -> Track:
     if rows is None:
         rows = _SWAPS[role](one.rows) if axes == ENU_FLU else one.rows
-    least = 1 if _is_held(one.source) else 2  # no line leads from a single message
+    held = one.source.between == 'hold'
+    least = 1 if held else 2  # no line leads from a single message
     if len(one.stamps) < least:
         expected = f'at least {least} messages on the clock of the velocity'
         raise InputError(one.bag, one.source.topic, expected, len(one.stamps) or 'none')
     told = one.source.gap is not None
-    return Track(role, one.source.topic, one.stamps, rows, _limit(one), _is_held(one.source),
-                 told=told)  # fmt: skip
+    return Track(role, one.source.topic, one.stamps, rows, _limit(one), held, told=told)
 
 
 def _limit(one: Recorded) -> float:
@@ -230,13 +219,9 @@ def _limit(one: Recorded) -> float:
     return np.inf if one.source.role == 'setpoint' else usual_limit(one.stamps)
 
 
-def _is_held(source: MappedTopic) -> bool:
-    return source.between == 'hold'
-
-
-def _velocity(one: Recorded, axes: str, pose: Track, frame: str) -> Track:
-    """Velocity in FSD if its messages write it in the axes of that frame."""
-    if frame == 'child':
+def _velocity(one: Recorded, axes: str, pose: Track, is_world: bool) -> Track:
+    """Velocity in FSD if its messages write it in the axes of the world, else of the body."""
+    if not is_world:
         return _track('twist', one, axes)
     halves = [one.rows[:, :3], one.rows[:, 3:]]
     if axes == ENU_FLU:
@@ -263,7 +248,7 @@ def with_rates(twist: Track, pose: Track, notes: list[str]) -> Track:
         asked = slice(*np.searchsorted(twist.ns, [first, last + 1]))
         ns = pose.ns[inside]
         if len(ns) >= SMALLEST:
-            t, at = (in_seconds(times, ns[0]) for times in (ns, twist.ns[asked]))
+            t, at = ((times - ns[0]) / NANOSECONDS for times in (ns, twist.ns[asked]))
             angular[asked] = rates(t, turned(pose.rows[inside, 3:]), at, SMALLEST, bias=False).rate
     known = ~np.isnan(angular[:, 0])
     notes.append(

@@ -94,7 +94,7 @@ def at_times(track: Track, ns: np.ndarray) -> np.ndarray:
     Of a pose, position by straight lines and attitude by slerp; of what is held, the sample before;
     else straight lines.
     """
-    seconds, at = (in_seconds(times, track.ns[0]) for times in (track.ns, ns))
+    seconds, at = ((times - track.ns[0]) / NANOSECONDS for times in (track.ns, ns))
     if track.held:
         return track.rows[np.clip(np.searchsorted(track.ns, ns, 'right') - 1, 0, None)]
     if track.role != 'pose' or not track.given[-1]:
@@ -126,11 +126,6 @@ def integral(track: Track, ns: np.ndarray) -> np.ndarray:
     parts = values[:-1] * dt if track.held else 0.5 * (values[:-1] + values[1:]) * dt
     area = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(parts, axis=0)])
     return area[np.searchsorted(knots, ns)] - area[np.searchsorted(knots, track.ns[0])]
-
-
-def in_seconds(ns: np.ndarray, origin: int) -> np.ndarray:
-    """Times in s from an origin in ns."""
-    return (ns - origin) / NANOSECONDS
 
 
 def _lines(seconds: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndarray:

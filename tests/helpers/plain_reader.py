@@ -52,8 +52,7 @@ def slow_read_bag(bag: str | Path) -> BagContents:
                     where = f'channel {record.channel_id}'
                     raise InputError(path, where, 'a channel before its messages', None)
                 topic = channels[record.channel_id].topic
-                contents.counts[topic] = contents.counts.get(topic, 0) + 1
-                contents.span(record.log_time, record.log_time)
+                contents.add(topic, record.log_time, record.log_time)
                 if record.channel_id in decoders:
                     message = _decoded(decoders[record.channel_id], record.data, path, topic)
                     _keep(contents, path, topic, message, frames)

@@ -98,9 +98,7 @@ def messages(
     met: Counter[str] = Counter()
 
     def taken(topic: str) -> bool:
-        if shares is None:
-            return True
-        share = shares.get(topic, 1.0)
+        share = (shares or {}).get(topic, 1.0)
         met[topic] += 1
         return math.ceil(met[topic] * share) > math.ceil((met[topic] - 1) * share)
 
@@ -141,12 +139,10 @@ def _survey_of_rosbags(bag: Path) -> BagContents:
     contents = BagContents()
     for part in _parts(bag):
         with _opened(part) as reader:
-            for connection in reader.connections:
-                topic = connection.topic
-                contents.types[topic] = connection.msgtype
-                contents.counts[topic] = contents.counts.get(topic, 0) + connection.msgcount
-            if reader.message_count:
-                contents.span(reader.start_time, reader.end_time - 1)
+            for one in reader.connections:
+                contents.types[one.topic] = one.msgtype
+                if one.msgcount:
+                    contents.add(one.topic, reader.start_time, reader.end_time - 1, one.msgcount)
     return contents
 
 

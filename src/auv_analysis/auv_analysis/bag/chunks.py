@@ -96,9 +96,7 @@ def by_channel(channels: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
 
 
 def gather(data: bytes, starts: np.ndarray, width: int) -> np.ndarray:
-    """Bytes (n, width) of a buffer that begin at (n,) places."""
-    if not len(starts):
-        return np.zeros((0, width), np.uint8)
+    """Bytes (n, width) of a buffer that begin at (n,) places, of which there must be some."""
     windows: np.ndarray = np.ndarray((len(data) - width + 1,), f'V{width}', data, strides=(1,))
     return windows[starts].view(np.uint8).reshape(-1, width)
 

@@ -71,14 +71,8 @@ class FileExtent:
     def add(self, topic: str, first: int, last: int, count: int = 1) -> None:
         """Count messages of a topic that were logged from `first` to `last`, ns."""
         self.counts[topic] = self.counts.get(topic, 0) + count
-        self.span(first, last)
-
-    def span(self, first: int, last: int) -> None:
-        """Note that there are messages logged from `first` to `last`, ns."""
-        if self.first is None or first < self.first:
-            self.first = first
-        if self.last is None or last > self.last:
-            self.last = last
+        self.first = first if self.first is None else min(self.first, first)
+        self.last = last if self.last is None else max(self.last, last)
 
 
 @dataclass

@@ -462,6 +462,7 @@ def test_refuses_parameters_that_are_none(tmp_path: Path, params: dict) -> None:
     ('ramp', 0, True), ('ramp', -0.1, False), ('ramp', True, False), ('ramp', np.inf, False),
     ('setpoint_pairing', 'exact', True), ('setpoint_pairing', 'newest', False),
     ('anti_windup', False, True), ('anti_windup', 1, False), ('limits.wrench', 5.0, False),
+    ('ramp', 10**309, False),
 ])  # fmt: skip
 def test_a_parameter_is_of_its_type_and_within_its_range(name, value, is_one) -> None:
     if is_one:

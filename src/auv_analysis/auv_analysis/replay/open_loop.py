@@ -26,6 +26,7 @@ from auv_analysis.bag.reading import Series
 from auv_analysis.bag.step_topics import NotOursError
 from auv_analysis.graph.node_parameters import CONTROLLER
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import is_number
 from auv_dynamics.ros import interface
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_gvc_controller.control.controller import FEWEST, Answer, VelocityController
@@ -103,27 +104,22 @@ def recorded_settings(values: Mapping[str, Any], source: str) -> ControllerSetti
 
     def reader(
         name: str, kind: Any, default: Any, _: str, *, at_least: float = 0.0,
-        at_most: float = math.inf, one_of: tuple[str, ...] = (),
+        at_most: float = interface.LARGEST, one_of: tuple[str, ...] = (),
     ) -> Any:  # fmt: skip
         value = values.get(name, default)
-        if kind is float and isinstance(value, int) and not isinstance(value, bool):
-            value = float(value)
-        good = {
-            float: lambda: (
-                isinstance(value, float) and at_least <= value <= at_most and value < math.inf
+        usable = {
+            float: (
+                is_number(value) and at_least <= value <= at_most,
+                f'a number from {at_least:g} to {at_most:g}',
             ),
-            list[float]: lambda: value is None or isinstance(value, list),
-            str: lambda: value in one_of,
-            bool: lambda: isinstance(value, bool),
+            list[float]: (value is None or isinstance(value, list), 'a list of numbers'),
+            str: (value in one_of, f'one of {", ".join(one_of)}'),
+            bool: (isinstance(value, bool), 'true or false'),
         }
-        if not good[kind]():
-            expected = {
-                float: f'a number from {at_least:g} to {at_most:g}',
-                str: f'one of {", ".join(one_of)}',
-                list[float]: 'a list of numbers', bool: 'true or false',
-            }  # fmt: skip
-            raise InputError(source, name, expected[kind], value)
-        return value
+        is_good, expected = usable[kind]
+        if not is_good:
+            raise InputError(source, name, expected, value)
+        return float(value) if kind is float else value
 
     return ControllerSettings.read(reader, source)
 

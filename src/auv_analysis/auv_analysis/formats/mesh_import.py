@@ -380,11 +380,6 @@ def shortened(triangles: np.ndarray, count: int) -> np.ndarray:
     return triangles
 
 
-def _areas(triangles: np.ndarray) -> np.ndarray:
-    """Normals (n, 3) of the length of the area, m2."""
-    return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) / 2
-
-
 def split(triangles: np.ndarray, n: int) -> np.ndarray:
     """Each of the triangles (m, 3, 3) as n^2 similar ones."""
     a, b, c = np.moveaxis(triangles, 1, 0)
@@ -434,7 +429,8 @@ def panel_added_mass(triangles: np.ndarray) -> np.ndarray:
 
     corners = np.arange(3 * len(triangles)).reshape(-1, 3)
     faces = np.column_stack([corners, corners[:, 2]])
-    area, middle = _areas(triangles), triangles.mean(axis=1)
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    area, middle = np.cross(b - a, c - a) / 2, triangles.mean(axis=1)  # normals of its length
     size = np.linalg.norm(area, axis=1)
     logging.getLogger(capytaine.__name__).setLevel(logging.ERROR)  # it tells much of meshes
     mesh = capytaine.Mesh(

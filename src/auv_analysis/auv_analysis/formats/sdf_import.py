@@ -11,12 +11,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from auv_analysis.formats.imported import (
-    POSITIVE,
-    SNAME,
-    Choices,
-    ImportedVehicle,
-)
+from auv_analysis.formats.imported import POSITIVE, SNAME, Choices, ImportedVehicle
 from auv_analysis.formats.xml_parts import displaced, link_inertia, numbers, other_links
 
 ROWS, COLUMNS = 'xyzkmn', 'UVWPQR'

@@ -7,12 +7,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from auv_analysis.formats.imported import (
-    POSITIVE,
-    SNAME,
-    Choices,
-    ImportedVehicle,
-)
+from auv_analysis.formats.imported import POSITIVE, SNAME, Choices, ImportedVehicle
 from auv_analysis.formats.xml_parts import (
     ENTRIES,
     inertia_entries,

@@ -107,10 +107,12 @@ def test_a_single_message_of_another_time_is_left_out_and_counted() -> None:
 @pytest.mark.parametrize(('seconds', 'kept'), [
     ([10, 11, 0, 0, 14, 900, 901, 17, 18], [0, 1, 4, 7, 8]), ([10], [0]),
     ([10, 0, 0, 13, 14, 0, 16], [0, 3, 4, 6]),
-    ([0, 1, 900, 901, 2, 3, 902, 903], [0, 1, 2, 3]), ([10, 11, 0, 1, 2, 15, 16], [2, 3, 4, 5, 6]),
+    ([0, 1, 900, 901, 2, 3, 902, 903], [0, 1, 2, 3]), ([10, 11, 0, 1, 2, 15, 16], [0, 1, 5, 6]),
+    ([10, 11, *range(5), 18, 19], [0, 1, 7, 8]), ([10, 11, *range(6), 18, 19], [*range(2, 10)]),
+    ([7, 8, 9, 4, 5, 6, 10, 11], [*range(8)]),
     ([0, 0, 12, 13], [0, 1, 2, 3]), ([10, 11, 12, 0, 0], [0, 1, 2]),
 ])  # fmt: skip
-def test_so_are_two_in_a_row_but_no_clocks_in_turn(seconds, kept) -> None:
+def test_so_are_five_in_a_row_but_no_clocks_in_turn_nor_swapped_parts(seconds, kept) -> None:
     found = longest_stretch(recorded(np.array(seconds) * SECOND), [])
     assert_array_equal(found.rows[:, 0], kept)
 

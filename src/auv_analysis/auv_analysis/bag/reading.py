@@ -14,12 +14,11 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 from typing import IO
 
 import numpy as np
-from mcap.records import Attachment, Channel, McapRecord, Metadata
+from mcap.records import Attachment, Channel, Metadata
 
 from auv_analysis.bag import limits
 from auv_analysis.bag.chunks import MessageTable
@@ -118,6 +117,8 @@ def slices(count: int, rows: int = 1 << 13) -> Iterator[slice]:
 HEALTH = 'diagnostic_msgs/msg/DiagnosticArray'
 BACK = interface.NANOSECONDS  # ns: stamps that fall by more have begun anew
 MOST_FALLS = 1000  # by less, beyond which they are none of a clock that was set
+MOST_STRAYS = 5  # messages in a row, beyond which a clock has begun anew
+MOST_SWAPPED = 2  # beyond which they are a part that only stands in another order
 GAP_PERIODS = 5.0  # median periods, at least, that make a pause a gap
 GAP_USUAL = 3.0  # times the interval that nine of ten keep: some topics come in bursts
 USUAL = 90.0  # percentile
@@ -149,7 +150,7 @@ def _set_back(ns: np.ndarray, apart: np.ndarray) -> Iterator[int]:
 
 
 def strays(ns: np.ndarray, topic: str, notes: list[str]) -> np.ndarray:
-    """Which stamps (n,) jump, alone or by twos, so that those around go on without them.
+    """Which stamps (n,) jump, a few in a row, so that those around go on without them.
 
     Parameters
     ----------
@@ -157,8 +158,10 @@ def strays(ns: np.ndarray, topic: str, notes: list[str]) -> np.ndarray:
     topic, notes : gets a line that counts them
 
     """
-    found = np.zeros(len(ns), bool)
-    for width in (1, 2) if np.any(np.diff(ns) < -BACK) else ():
+    found, most = np.zeros(len(ns), bool), 0
+    if np.any(np.diff(ns) < -BACK):
+        most = MOST_SWAPPED if are_swapped(ns) else MOST_STRAYS
+    for width in range(1, most + 1):
         left = np.flatnonzero(~found)
         found[left[_jumps(ns[left], width)[:, None] + np.arange(width)]] = True
     if count := np.count_nonzero(found):
@@ -183,9 +186,11 @@ def are_swapped(ns: np.ndarray) -> bool:
     Chunks and files may; where a clock began anew, the parts overlap or are apart.
     """
     jumps = np.flatnonzero(np.abs(np.diff(ns)) > BACK) + 1
-    parts = np.split(ns, np.union1d(jumps, stretches(ns)[1:-1]).astype(np.int64))
-    spans = sorted((part.min(), part.max()) for part in parts)
-    return all(0 < other[0] - one[1] <= BACK for one, other in pairwise(spans))
+    begins = np.union1d(jumps, stretches(ns)[:-1]).astype(np.int64)
+    first, last = np.minimum.reduceat(ns, begins), np.maximum.reduceat(ns, begins)
+    order = np.argsort(first)
+    between = first[order][1:] - last[order][:-1]
+    return bool(np.all((between > 0) & (between <= BACK)))
 
 
 def usual_limit(ns: np.ndarray) -> float:
@@ -270,19 +275,15 @@ class FileReader:
         for item in self._file.records():
             if isinstance(item, MessageTable):
                 yield from self._table(item)
-            else:
-                self._record(item)
+            elif isinstance(item, Channel):
+                self._channel(item)
+            elif isinstance(item, Attachment):
+                self._attachment(item)
+            elif isinstance(item, Metadata):
+                self._contents.metadata[item.name] = dict(item.metadata)
         for topic, count in self._left_out.items():
             counted = f'{self._path.name}: {topic}: {count} unusable messages left out'
             self._contents.notes.append(f'{counted}, the first one: {self._reasons[topic]}')
-
-    def _record(self, item: McapRecord) -> None:
-        if isinstance(item, Channel):
-            self._channel(item)
-        elif isinstance(item, Attachment):
-            self._attachment(item)
-        elif isinstance(item, Metadata):
-            self._contents.metadata[item.name] = dict(item.metadata)
 
     def _attachment(self, item: Attachment) -> None:
         kept = self._contents.attachments

@@ -310,6 +310,15 @@ def test_what_another_publisher_left_ahead_was_not_followed(tmp_path, lockstep) 
     assert_array_equal(run.nu_d[:, 0], [*range(5), *later])
 
 
+def test_a_single_set_point_of_another_operator_is_no_stray(tmp_path) -> None:
+    """Amid a plan that lies more than a second ahead of it, whose place it takes."""
+    stamps, given = range(1000, 1400, GRID), [*range(1000, 1400, GRID), 3000, 3020, 1090, 3040]
+    params = '/**/controller_node:\n  ros__parameters: {setpoint_pairing: latest, '
+    params += 'lockstep: false}\n'
+    run = load_run(write(tmp_path, stamps, given, params=params, as_given=True))
+    assert_array_equal(run.nu_d[:, 0], [*range(5), *[22] * 15])
+
+
 def test_set_points_that_were_always_too_old_are_none(tmp_path: Path) -> None:
     told = 'setpoint_pairing: latest, setpoint_timeout: 0.05'
     params = f'/**/controller_node:\n  ros__parameters: {{{told}}}\n'

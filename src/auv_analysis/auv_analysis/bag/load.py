@@ -347,8 +347,8 @@ def longest_stretch(
     """The part of each topic in which the odometry goes on longest, and notes on what is left out.
 
     Where a clock begins anew, that of every topic does, but for one that has another clock. Before,
-    single messages with a stamp of another time are left out. What only stands in another order is
-    sorted.
+    a few messages with stamps of another time are left out, but for set-points, see `obeyed`. What
+    only stands in another order is sorted.
 
     Parameters
     ----------
@@ -359,8 +359,7 @@ def longest_stretch(
     found, notes, cuts = dict(series), list[str](), dict[str, list[int]]()
     for role, (ns, rows) in series.items():
         stamps = rows_of(ns, slice(None))
-        stray = strays(stamps, role, notes)
-        if stray.any():
+        if role not in SETPOINTS and (stray := strays(stamps, role, notes)).any():
             stamps = stamps[~stray]
             found[role] = stamps, _picked(rows, np.flatnonzero(~stray), whole)
         cuts[role] = stretches(stamps)

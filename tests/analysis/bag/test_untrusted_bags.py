@@ -155,8 +155,9 @@ def test_a_repair_is_not_blown_up_either(
     path = write_chunk(tmp_path / 'bag' / 'bag_0.mcap', chunk)
     with pytest.raises(SystemExit) as ended:
         main(['recover', str(path.parent)])
-    assert ended.value.code == 1
-    assert 'nothing in it can be recovered' in capsys.readouterr().err
+    assert ended.value.code == (2 if size == HUGE else 1)
+    told = 'expected a chunk of at most' if size == HUGE else 'nothing in it can be recovered'
+    assert told in capsys.readouterr().err
     assert os.listdir(path.parent) == ['bag_0.mcap']
 
 
@@ -167,13 +168,33 @@ def test_a_repair_keeps_what_stands_around_a_chunk_that_is_too_large(
     head = costly_bags.schema(1, 'x/Y') + costly_bags.channel(1, '/x')
     held = [head + costly_bags.message(1, k, bytes(size)) for k, size in enumerate((5, 999, 7))]
     path = tmp_path / 'bag_0.mcap'
-    path.write_bytes(data := costly_bags.file_of(*map(costly_bags.chunk, held)))
-    old(path)
-    (found,) = recover(tmp_path).document()['files']
+    whole = costly_bags.file_of(*map(costly_bags.chunk, held))
     told = f'expected a chunk of at most 1000 bytes, found {len(held[1])}, decompressed'
-    assert found['faults'] == [f'damaged: {told}']
-    assert found['messages'] == 2
-    assert (tmp_path / found['kept_as']).read_bytes() == data
+    path.write_bytes(whole)
+    with pytest.raises(InputError, match=rf'byte \d+: {told}; nothing else is wrong'):
+        recover(tmp_path)
+    assert [(one, one.read_bytes()) for one in tmp_path.iterdir()] == [(path, whole)]
+    for data, said in (
+        (whole[: -len(MAGIC)], 'was not finished'), (whole + b'xy', 'damaged: another end')
+    ):  # fmt: skip
+        path.write_bytes(data)
+        old(path)
+        (found,) = recover(tmp_path).document()['files']
+        assert found['faults'] == [f'too large: {told}', said]
+        assert found['messages'] == 2
+        assert (tmp_path / found['kept_as']).read_bytes() == data
+
+
+def test_a_record_that_is_too_large_is_no_damage(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor is the one before it, which is believed by what follows it."""
+    monkeypatch.setattr(limits, 'LARGEST_OTHER', 1000)
+    small, large = (costly_bags.record(12, costly_bags.text('a') + bytes(n)) for n in (4, 1001))
+    (tmp_path / 'bag_0.mcap').write_bytes(costly_bags.file_of(small, large, small))
+    told = 'expected a record of at most 1000 bytes, found 1006; nothing else is wrong'
+    with pytest.raises(InputError, match=told):
+        recover(tmp_path)
 
 
 @pytest.mark.parametrize('opcode', [3, 4, 5, 6, 7, 9, 12, 0x80])

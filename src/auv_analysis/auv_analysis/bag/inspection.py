@@ -16,6 +16,7 @@ from auv_analysis.bag.chunks import MessageTable, by_channel
 from auv_analysis.bag.mcap_file import Lost, McapFile, MessageIndex, Read
 from auv_analysis.bag.metadata import Definition, FileExtent
 from auv_analysis.bag.step_topics import role_of
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.interface import NANOSECONDS, OPTIONAL_STEP_TOPICS, STEP_TOPICS
 
 ROSBAG2 = 'rosbag2'  # metadata that rosbag2 and our recorder write when a file is closed
@@ -256,7 +257,9 @@ class Inspection:
         self._footer |= item.opcode == Opcode.FOOTER
 
     def _faults(self, file: McapFile) -> list[str]:
-        found = [f'damaged: {lost.why}' for lost in self.lost]
+        """What is wrong; InputError where that is only that a record is too large for us."""
+        lost = [f'{"too large" if one.limit else "damaged"}: {one.why}' for one in self.lost]
+        found = []
         if not (self._data_end and self._footer and file.ends_well):
             found.append('was not finished')
         if self.header is None:
@@ -267,7 +270,11 @@ class Inspection:
             found.append('has messages whose topic is not known')
         found += file.faults
         found += [f'{name} is defined twice' for name in sorted(self.definitions.doubtful)]
-        return list(dict.fromkeys(found))
+        if self.lost and not found and all(one.limit for one in self.lost):
+            expected, size = self.lost[0].limit
+            key = f'byte {self.lost[0].start}'
+            raise InputError(self.path, key, expected, f'{size}; nothing else is wrong')
+        return list(dict.fromkeys(lost + found))
 
 
 @dataclass

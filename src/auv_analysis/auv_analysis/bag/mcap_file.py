@@ -135,12 +135,22 @@ class Read(NamedTuple):
 
 
 class Lost(NamedTuple):
-    """Bytes that cannot be used, and why; `cut`: because the file ends within a record."""
+    """Bytes that cannot be used, and why.
+
+    Attributes
+    ----------
+    start, end : of them
+    why : in a few words
+    cut : whether the file ends within a record
+    limit : of a record that is too large to be looked at: what is expected, and what was found
+
+    """
 
     start: int
     end: int
     why: str
     cut: bool = False
+    limit: tuple[str, ...] = ()
 
 
 class _CutError(Exception):
@@ -296,7 +306,9 @@ class McapFile:
         except TooLargeError as error:
             if isinstance(error, TooManyError) or not self._resync:
                 raise InputError(self.path, f'byte {place}', *error.args) from None
-            return Lost(place, end, first_line(error))
+            _, length = PREFIX.unpack(self._bytes(place, PREFIX.size))
+            end = place + PREFIX.size + length
+            return Lost(place, end, first_line(error), limit=error.args)
         except DAMAGES as error:
             return Lost(place, end, first_line(error))
 
@@ -400,12 +412,13 @@ class McapFile:
         data = self._bytes(place, PREFIX.size)
         if not data:
             return True
-        if not data[0] or data[0] in RESERVED:
+        opcode, length = PREFIX.unpack(data.ljust(PREFIX.size, b'\0'))
+        if not opcode or opcode in RESERVED:
             return False
         try:
-            limits.check_length(*PREFIX.unpack(data.ljust(PREFIX.size, b'\0')))
-        except McapError:
-            return False
+            limits.check_length(opcode, length)
+        except McapError:  # perhaps whole, and too large for us
+            return place + PREFIX.size + int(length) <= self.size
         return True
 
     def _next_proven(self, begin: int) -> Read | None:

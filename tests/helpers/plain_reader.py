@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mcap.exceptions import EndOfFile, McapError
-from mcap.records import Attachment, Channel, Chunk, DataEnd, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Message, Schema
 from mcap.stream_reader import StreamReader, get_chunk_data_stream
 from mcap_ros2.decoder import DecoderFactory
 from zstandard import ZstdError
@@ -82,8 +82,6 @@ def slow_read_bag(bag: str | Path) -> BagContents:
                     decoders[record.id] = decoder
             elif isinstance(record, Attachment):
                 contents.attachments[record.name] = record.data.decode('utf-8', 'replace')
-            elif isinstance(record, Metadata):
-                contents.metadata[record.name] = dict(record.metadata)
     return contents
 
 

@@ -19,7 +19,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from auv_analysis.bag.any_bag import messages, survey
 from auv_analysis.bag.foreign_run import load_foreign
 from auv_analysis.bag.foreign_topics import read_mapping
-from auv_analysis.bag.mavlink_logs import PARAMETERS, too_slow
+from auv_analysis.bag.mavlink_logs import too_slow
 from auv_analysis.bag.mavlink_presets import preset
 from auv_analysis.bag.metadata import TopicExtent
 from auv_analysis.bag.reading import BagContents
@@ -139,7 +139,7 @@ def test_thrusters_are_those_that_the_parameters_name(run, pulses, tmp_path) -> 
 )
 def test_a_frame_of_ardusub_has_so_many_motors(frame: str, motors: int) -> None:
     topics = {topic: f'mavlink/{topic}' for topic in ('ATTITUDE', 'SERVO_OUTPUT_RAW')}
-    contents = BagContents(types=topics, metadata={PARAMETERS: {'FRAME_CONFIG': frame}})
+    contents = BagContents(types=topics, parameters={'FRAME_CONFIG': frame})
     proposed = yaml.safe_load(preset(contents))
     assert proposed['thrusters']['fields'] == [f'servo{i + 1}_raw' for i in range(motors)]
 

@@ -131,7 +131,7 @@ def assert_equal_reading(bag: Path) -> BagContents | str:
         assert found == expected
         return found
     assert isinstance(found, BagContents), found
-    for name in ('attachments', 'metadata', 'types', 'counts', 'first', 'last', 'notes'):
+    for name in ('attachments', 'types', 'counts', 'first', 'last', 'notes'):
         assert getattr(found, name) == getattr(expected, name), name
     assert found.messages.keys() == expected.messages.keys()
     for topic, (stamps, rows) in expected.messages.items():

@@ -220,8 +220,6 @@ class _Messages:
                 raise self._refusal('messages of its type', error.found) from None
             key = f'{self._key}.{error.key}'
             raise InputError(self._bag, key, error.expected, error.found) from None
-        except InputError:
-            raise
         except (LookupError, AttributeError, TypeError, ValueError) as error:
             # other fields than its type has, or a shorter array
             raise self._refusal('messages of its type', str(error)) from None

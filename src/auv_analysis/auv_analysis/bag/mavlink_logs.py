@@ -12,7 +12,6 @@ from auv_analysis.bag.reading import BagContents
 from auv_analysis.bag.telemetry_log import Message, TelemetryLog
 from auv_dynamics.files.errors import InputError, refusing
 
-PARAMETERS = 'parameters'  # of BagContents.metadata
 SLOW = 9.0  # Hz, from which what should come at 10 Hz is too slow
 FAST = 'bit 0 (ATTITUDE_FAST) of LOG_BITMASK, 25 Hz'
 HINTS = {
@@ -23,14 +22,14 @@ HINTS = {
 
 
 def survey_of_log(path: Path) -> BagContents:
-    """Topics, counts and span of a log; its parameters in `metadata['parameters']`."""
+    """Topics, counts, span and parameters of a log."""
     contents = BagContents()
     with _opened(path) as log:
         for topic, tally in log.tallies(contents.notes).items():
             contents.types[topic] = f'{log.kind}/{topic.partition("[")[0]}'
             contents.add(topic, tally.first, tally.last, tally.count)
             contents.notes += too_slow(topic, tally)
-        contents.metadata[PARAMETERS] = log.parameters
+        contents.parameters = log.parameters
     return contents
 
 

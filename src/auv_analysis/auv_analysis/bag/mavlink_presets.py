@@ -4,7 +4,6 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from auv_analysis.bag.mavlink_logs import PARAMETERS
 from auv_analysis.bag.reading import BagContents
 from auv_dynamics.files.yaml_files import yaml_text
 
@@ -82,7 +81,7 @@ def _thrusters(contents: BagContents, topic: str, stamp: Mapping[str, Any]) -> d
     """Outputs in the order of the motors, as parameters tell; else the first eight."""
     if topic not in contents.types:
         return {}
-    told = contents.metadata.get(PARAMETERS, {})
+    told = contents.parameters
     servos = ((re.fullmatch(r'SERVO(\d+)_FUNCTION', name), told[name]) for name in told)
     outputs = {float(value) - MOTOR: int(servo[1]) for servo, value in servos if servo}
     count = MOTORS.get(told.get('FRAME_CONFIG', ''), EIGHT)

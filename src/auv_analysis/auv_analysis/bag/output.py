@@ -171,17 +171,14 @@ class BagFile:
         self._definitions: list[Definition] = []
         self._ending = ENDING + 256 * len(attachments)
         try:
-            self._begin(attachments)
+            self._writer.start(profile='ros2', library='auv_gvc')
+            for name, text in attachments.items():
+                kind = 'application/yaml' if name.endswith(('.yaml', '.yml')) else 'text/plain'
+                self._writer.add_attachment(0, 0, name, kind, text.encode())
         except OSError:
             self.output.close()
             path.unlink(missing_ok=True)
             raise
-
-    def _begin(self, attachments: Mapping[str, str]) -> None:
-        self._writer.start(profile='ros2', library='auv_gvc')
-        for name, text in attachments.items():
-            kind = 'application/yaml' if name.endswith(('.yaml', '.yml')) else 'text/plain'
-            self._writer.add_attachment(0, 0, name, kind, text.encode())
 
     def define(self, definition: Definition, schema: str) -> None:
         """Register a topic.

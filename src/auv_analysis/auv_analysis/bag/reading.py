@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
-from mcap.records import Attachment, Channel, Metadata
+from mcap.records import Attachment, Channel
 
 from auv_analysis.bag import limits
 from auv_analysis.bag.chunks import MessageTable
@@ -208,7 +208,7 @@ class BagContents(FileExtent):
     Attributes
     ----------
     attachments : name -> text
-    metadata : name -> mapping
+    parameters : of the autopilot of a log, name -> value
     types : topic -> message type
     messages : topic -> stamps (n,) in ns and values (n, 6) or (n, 13), of our topics
     notes : what is odd, one line each
@@ -227,7 +227,7 @@ class BagContents(FileExtent):
     """
 
     attachments: dict[str, str] = field(default_factory=dict)
-    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    parameters: dict[str, str] = field(default_factory=dict)
     types: dict[str, str] = field(default_factory=dict)
     messages: dict[str, Series] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
@@ -279,8 +279,6 @@ class FileReader:
                 self._channel(item)
             elif isinstance(item, Attachment):
                 self._attachment(item)
-            elif isinstance(item, Metadata):
-                self._contents.metadata[item.name] = dict(item.metadata)
         for topic, count in self._left_out.items():
             counted = f'{self._path.name}: {topic}: {count} unusable messages left out'
             self._contents.notes.append(f'{counted}, the first one: {self._reasons[topic]}')

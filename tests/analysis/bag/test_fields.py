@@ -158,7 +158,7 @@ def test_numbers_are_those_of_a_message_itself_and_no_truth_values() -> None:
         MessageReader('pose', {'z': 'on'}, {}, None)(message)
     with pytest.raises(FieldError, match='text, which is str') as refusal:
         MessageReader('pose', {'z': 'few[0]'}, {}, ('text', 's'))(message)
-    assert refusal.value.key == 'stamp'
+    assert refusal.value.args[0] == 'stamp'
 
 
 def test_rows_of_nothing_and_of_absurd_numbers_are_of_no_use() -> None:

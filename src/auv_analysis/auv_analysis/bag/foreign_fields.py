@@ -177,11 +177,7 @@ class Reading(NamedTuple):
 
 
 class FieldError(ValueError):
-    """A path that does not lead to a number."""
-
-    def __init__(self, key: str, expected: str, found: str):
-        self.key, self.expected, self.found = key, expected, found
-        super().__init__(found)
+    """A path that does not lead to a number: the key, what is expected and what was found."""
 
 
 class MessageReader:

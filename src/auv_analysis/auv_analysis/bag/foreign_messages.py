@@ -216,10 +216,10 @@ class _Messages:
         try:
             reading = self._read(message)
         except FieldError as error:
-            if self.source.fields is None and not error.key.startswith('stamp'):
-                raise self._refusal('messages of its type', error.found) from None
-            key = f'{self._key}.{error.key}'
-            raise InputError(self._bag, key, error.expected, error.found) from None
+            key, expected, found = error.args
+            if self.source.fields is None and not key.startswith('stamp'):
+                raise self._refusal('messages of its type', found) from None
+            raise InputError(self._bag, f'{self._key}.{key}', expected, found) from None
         except (LookupError, AttributeError, TypeError, ValueError) as error:
             # other fields than its type has, or a shorter array
             raise self._refusal('messages of its type', str(error)) from None

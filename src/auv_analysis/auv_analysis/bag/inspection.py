@@ -170,7 +170,7 @@ class Inspection:
     definitions : of its topics
     header : None where it is lost
     spacings : channel id -> the stamps of its messages
-    attachments : names and sizes
+    attachments : their names
     lost : bytes that cannot be used
     faults : what else is wrong, a few words each; empty: the file is healthy
     compression : of its first chunk, None: it has no chunks
@@ -183,7 +183,7 @@ class Inspection:
         self.definitions = Definitions()
         self.header: Header | None = None
         self.spacings: dict[int, Spacing] = {}
-        self.attachments: list[tuple[str, int]] = []
+        self.attachments: list[str] = []
         self.lost: list[Lost] = []
         self.compression: str | None = None
         self.packed = False
@@ -244,7 +244,7 @@ class Inspection:
             elif isinstance(part, Schema | Channel):
                 self.definitions.add(part, trust)
             elif isinstance(part, Attachment):
-                self.attachments.append((part.name, len(part.data)))
+                self.attachments.append(part.name)
             elif isinstance(part, MessageIndex):
                 self._orphans += 0 if has_chunk else part.messages
             elif isinstance(part, Metadata):
@@ -345,7 +345,7 @@ class Report:
                 for topic, (kind, spacing) in sorted(topics.items())
             },
             'attachments': sorted(
-                {name for file in self.files for name, _ in file.inspection.attachments}
+                {name for file in self.files for name in file.inspection.attachments}
             ),
             'notes': self.notes,
         }

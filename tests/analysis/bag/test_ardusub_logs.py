@@ -309,6 +309,9 @@ def test_slow_topics_are_named_with_what_raises_them(run, pulses, tmp_path) -> N
         servos = next(note for note in said if note.startswith('SERVO_OUTPUT_RAW: 1 Hz'))
         assert 'SR0_RC_CHAN' in servos
         assert 'MAV_CMD_SET_MESSAGE_INTERVAL' in servos
+    alone: list[str] = []
+    list(messages(log, ['ATTITUDE'], alone))
+    assert [note[:9] for note in alone] == ['ATTITUDE:'], 'of what is read alone'
     for last, count, said in ((10**9, 10, 0), (10**9 + 1, 10, 1), (10**9, 1, 0), (10**9, 2, 1)):
         assert len(too_slow('ATT', TopicExtent(0, last, count))) == said
     slow = tmp_path / 'x.BIN'

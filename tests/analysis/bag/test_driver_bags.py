@@ -337,6 +337,10 @@ def test_of_an_unknown_recorder_set_points_with_stamps_of_their_own_are_held(
     often, seldom = list(range(1000, 1110, 10)), [1000, 1030, 1060, 1090]
     sparse = load_run(write(tmp_path / 'sparse', often, seldom, recording=''))
     assert_array_equal(sparse.nu_d[:, 0], [0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3])
+    assert any(held.format('6 of 10') in note for note in sparse.notes)
+    four, three = [1000, 1020, 1040, 1060], [1000, 1020, 1060]
+    quarter = load_run(write(tmp_path / 'quarter', four, three, recording=''))
+    assert_array_equal(quarter.nu_d[:, 0], [0.0, 1.0, 2.0])
     same = load_run(write(tmp_path / 'same', STAMPS, STAMPS[:3], recording=''))
     assert_array_equal(same.nu_d[:, 0], [0.0, 1.0, 2.0])
     assert not any('taken as held' in note for note in same.notes)

@@ -269,6 +269,14 @@ def test_a_gap_is_one_from_half_a_usual_interval_more() -> None:
     assert gaps['longest'] == [[0.072, 0.162], [0.08, 0.111], [0.131, 0.162]]
 
 
+def test_the_ends_of_a_spacing_are_those_in_the_bag_and_those_by_size() -> None:
+    found = Spacing()
+    for stamps in ([5, 3, 9, 4], [2, 8], [1]):
+        found.add(np.array(stamps))
+    assert (found.first, found.last, found.count) == (5, 1, 7)
+    assert (found.earliest, found.latest) == (1, 9)
+
+
 def test_policies_are_read_up_to_a_size_of_all_together(monkeypatch: pytest.MonkeyPatch) -> None:
     texts = {'/a': '- {depth: 1}', '/b': '- {depth: 25}', '/c': '- {depth: 1}', '/d': 'depth: 1',
              '/e': '- &a [*a]', '/f': '- ]'}  # fmt: skip

@@ -88,6 +88,8 @@ def test_parts_that_stand_in_another_order_are_one_recording() -> None:
     assert len(longest_stretch(paused, notes).stamps) < 12, 'two seconds later: another run'
     overlapping = recorded(np.array([10, 12, 14, 16, 4, 6, 8, 11]) * SECOND // 2)
     assert len(longest_stretch(overlapping, notes).stamps) == 4, 'of the same time: another run'
+    touching = recorded(np.array([5, 6, 7, 2, 3, 4, 5]) * SECOND)
+    assert len(longest_stretch(touching, notes).stamps) == 4, 'at one time: another run'
 
 
 def test_a_single_message_of_another_time_is_left_out_and_counted() -> None:

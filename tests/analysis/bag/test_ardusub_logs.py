@@ -19,8 +19,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from auv_analysis.bag.any_bag import messages, survey
 from auv_analysis.bag.foreign_run import load_foreign
 from auv_analysis.bag.foreign_topics import read_mapping
-from auv_analysis.bag.mavlink_logs import too_slow
-from auv_analysis.bag.mavlink_presets import preset
+from auv_analysis.bag.mavlink_logs import preset, too_slow
 from auv_analysis.bag.metadata import TopicExtent
 from auv_analysis.bag.reading import BagContents
 from auv_analysis.cli.main import main

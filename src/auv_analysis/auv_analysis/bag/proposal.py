@@ -33,7 +33,7 @@ from auv_analysis.bag.foreign_topics import (
     has_word,
     words_of,
 )
-from auv_analysis.bag.mavlink_presets import CURVE
+from auv_analysis.bag.mavlink_logs import CURVE
 from auv_analysis.bag.reading import BagContents
 from auv_analysis.bag.step_topics import role_of
 from auv_dynamics.files.errors import InputError

@@ -16,7 +16,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     """What lies in a bag."""
     from auv_analysis.bag.any_bag import survey
     from auv_analysis.bag.foreign_topics import candidates
-    from auv_analysis.bag.mavlink_presets import preset
+    from auv_analysis.bag.mavlink_logs import preset
     from auv_analysis.bag.metadata import files_of
     from auv_analysis.bag.proposal import looked_through, proposal
     from auv_analysis.output.progress import waiting

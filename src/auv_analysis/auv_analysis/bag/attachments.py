@@ -26,7 +26,6 @@ LAW = re.compile(r'[A-Za-z_][\w.]*:[A-Za-z_]\w*', re.ASCII)  # module:Class
 UNKNOWN = 'unknown'  # law of a bag without params.yaml
 Parameters = dict[str, dict[str, Any]]  # of nodes, by their names
 Scenario = dict[str, Any] | None  # of a bag; None: it carries none
-FIRST_TAKEN = 'settings of the controller were changed while it was recorded, the first are taken'
 OWN = 2  # rank of parameters for the namespace; 1: for any, 0: for another
 
 
@@ -84,7 +83,8 @@ def _in_charge(controller: dict[str, Any], contents: BagContents) -> dict[str, A
     law, text, changed = course[0][0]
     others |= _mapping(changed) or {}
     if len({told[2] for told, _ in course}) > 1:
-        contents.notes.append(f'{FIRST_TAKEN}: {printable(said)}')
+        note = 'settings of the controller were changed while it was recorded'
+        contents.notes.append(f'{note}: {printable(said)}')
     if len({told[:2] for told, _ in course}) > 1:
         note = 'law or gains were changed while it was recorded, none is taken'
         contents.notes.append(f'{note}: {printable(said)}')

@@ -204,11 +204,9 @@ def recorded_loop(
     derivatives = interface.CMD_ACCEL in series
     controller = RecordedController(own, known, bag, derivatives=derivatives, told=told)
     begun = [UNTOLD] * ('params.yaml' not in contents.attachments)
-    notes = contents.notes
     if controller.settings.lockstep:  # whose clock never begins anew: only chunks may be swapped
         series = in_order(series)
-    else:  # settings are taken in turn
-        notes = [note for note in notes if not note.startswith(attachments.FIRST_TAKEN)]
+    else:
         if not contents.strict:
             series, anew = longest_stretch(series, math.inf)
             begun += anew
@@ -218,7 +216,7 @@ def recorded_loop(
         controller,
         attachments.scenario_name(attachments.scenario_of(contents, bag), bag),
         attachments.controller_name(parameters, bag),
-        (*notes, *begun),
+        (*contents.notes, *begun),
     )
 
 

@@ -328,10 +328,7 @@ def test_the_minimum_is_that_of_scipy(herman):
 
     def residuals(p):
         theta, z = p[:n], p[n:].reshape(count, 9)
-        which = slice(0, count)
-        starts = problem.starts(z[None])
-        states = problem.simulate(u, theta[None], starts, which)
-        rows = [e.ravel() for e in problem.residuals(which, starts, states)]
+        rows = [e.ravel() for e in problem.residuals(u, theta, z)]
         return np.concatenate([*rows, (z / 10.0).ravel(), theta])
 
     ours = problem.fit(u, np.zeros(n), tolerance=1e-12)

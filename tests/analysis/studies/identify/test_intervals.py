@@ -248,16 +248,15 @@ def test_blocks_of_time_are_segments_parts_of_them_or_several(quiet, monkeypatch
             monkeypatch.setattr(output_error, name, value)
         fit = problem.fit(u, theta, most=0)
         found = problem.blocks(fit)
-        assert len(found.A) == len(found.g) == fit.blocks
+        assert [len(of) for of in found] == [fit.blocks] * 2
         return found
 
     one = blocks(5, 400)
     few = len(theta) * len(segments[0].command) * 13 * 8 * 3  # fewer than all at once
-    for of in ('A', 'g'):
-        alone = getattr(one, of)
+    for of, alone in enumerate(one):
         assert len(alone) == 5
         halves, several, in_turn = (
-            getattr(made, of) for made in (blocks(9, 400), blocks(1, 2), blocks(5, 400, few))
+            made[of] for made in (blocks(9, 400), blocks(1, 2), blocks(5, 400, few))
         )
         assert_allclose(halves[::2] + halves[1::2], alone, rtol=1e-9, atol=1e-9)
         assert np.abs(halves[0] - halves[1]).max() > 1e-3

@@ -28,19 +28,18 @@ def bootstrap(problem: OutputError, fit: Fit, count: int, beside: np.ndarray) ->
     """
     rng, u = np.random.default_rng(SEED), fit.unknowns
     P, p = u.precision(fit.theta)
-    blocks = problem.blocks(fit)
-    left = blocks.g.sum(axis=0) + p  # of the gradient at the minimum: starts are less free there
+    A, g = problem.blocks(fit)
+    left = g.sum(axis=0) + p  # of the gradient at the minimum: starts are less free there
     weights = rng.multinomial(fit.blocks, np.full(fit.blocks, 1 / fit.blocks), size=count)
     said = rng.standard_normal((count, len(p))) @ np.linalg.cholesky(P).T - left
     back = problem.normal(u, fit.theta, fit.starts).eliminated()[2][..., :-1]
     found = np.empty((count, len(p)))
     for k, (w, own) in enumerate(zip(weights, said, strict=True)):
-        A, g = np.tensordot(w, blocks.A, 1) + P, w @ blocks.g + p + own
-        move = -np.linalg.solve(A, g)
+        move = -np.linalg.solve(np.tensordot(w, A, 1) + P, w @ g + p + own)
         at = replace(fit, theta=fit.theta + move, starts=fit.starts - back @ move)
-        again, (P_at, p_at) = problem.blocks(at), u.precision(at.theta)
-        A, g = np.tensordot(w, again.A, 1) + P_at, w @ again.g + p_at + own
-        found[k] = at.theta - np.linalg.solve(A, g)
+        (A_at, g_at), (P_at, p_at) = problem.blocks(at), u.precision(at.theta)
+        S = np.tensordot(w, A_at, 1) + P_at
+        found[k] = at.theta - np.linalg.solve(S, w @ g_at + p_at + own)
     return found + rng.multivariate_normal(np.zeros(len(p)), beside, count, method='eigh')
 
 

@@ -57,28 +57,6 @@ class Normal:
 
 
 @dataclass(frozen=True, eq=False)
-class Blocks:
-    """Normal equations by blocks of time, starts eliminated: A (B, n, n) and g (B, n) of theta.
-
-    A block is a segment, a part of one where they are few, or several where they are many.
-    """
-
-    A: np.ndarray
-    g: np.ndarray
-
-    def covariance(self, P: np.ndarray) -> np.ndarray:
-        """(n, n) of theta by the jackknife (the sandwich, without its bias), for a prior P.
-
-        A block counts as one observation, whatever its residuals are correlated with inside. What
-        the prior says is as uncertain as it says itself.
-        """
-        S, count = self.A.sum(axis=0) + P, len(self.g)
-        moves = np.linalg.solve(S - self.A, self.g[..., None])[..., 0]
-        inverse = np.linalg.inv(S)
-        return (count - 1) / count * moves.T @ moves + inverse @ P @ inverse
-
-
-@dataclass(frozen=True, eq=False)
 class Fit:
     """A minimum.
 
@@ -159,60 +137,60 @@ class OutputError:
             observer=np.full(10, self.observer) if self.observer else None,
         )  # fmt: skip
 
-    def starts(self, z: np.ndarray, which: slice = slice(None)) -> np.ndarray:
-        """Attitude and velocity (..., S, 10) of starts z (..., S, 9): nu, then rotation."""
-        first, moved = self._first[which], z * self._deviation
-        q = rotated(first[:, :4], moved[..., 6:])
-        return np.concatenate([q, first[:, 4:] + moved[..., :6]], axis=-1)
+    def runs(
+        self, unknowns: Unknowns, theta: np.ndarray, z: np.ndarray, moves: np.ndarray | None = None
+    ) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+        """Segments that are simulated together, their starts (V, S, 10) and states (V, S, n, 13).
+
+        Variants are moves (V, n + 9) of theta (n,) and of all starts z (S, 9): nu, then rotation;
+        None: one, unmoved.
+        """
+        n = len(theta)
+        moves = np.zeros((1, n + 9)) if moves is None else moves
+        most = max(int(BYTES / (len(moves) * len(self.segments[0].command) * 13 * 8)), 1)
+        for begin in range(0, len(self.segments), most):
+            which = slice(begin, begin + most)
+            first, moved = self._first[which], (z[which] + moves[:, None, n:]) * self._deviation
+            q = rotated(first[:, :4], moved[..., 6:])
+            starts = np.concatenate([q, first[:, 4:] + moved[..., :6]], axis=-1)
+            yield which, starts, self.simulate(unknowns, theta + moves[:, :n], starts, which)
 
     def residuals(
-        self, which: slice, starts: np.ndarray, states: np.ndarray
+        self, unknowns: Unknowns, theta: np.ndarray, z: np.ndarray, moves: np.ndarray | None = None
     ) -> Iterator[np.ndarray]:
-        """Of each segment (V, r, 9): measured less simulated in deviations; 0: not measured."""
-        scale = self._deviation * (1.0 - self.observer)  # states are those behind a correction
-        for s, segment in enumerate(self.segments[which]):
-            e = np.empty((len(states), len(segment.at), 9))
-            at, nu, q = (
-                np.require(part, float, ('C', 'A', 'W'))  # another kind would be compiled for
-                for part in (segment.at, segment.nu, segment.q)
-            )
-            with np.errstate(all='ignore'):  # states may be what is left of a divergence
-                fill_residuals(starts, states, s, at, nu, q, scale, e)
-            yield e
+        """Of each segment (V, r, 9): measured less simulated in deviations; 0: not measured.
 
-    def slices(self, variants: int) -> Iterator[slice]:
-        """Segments that are simulated together, so that so many variants of them fit."""
-        n = len(self.segments[0].command)
-        most = max(int(BYTES / (variants * n * 13 * 8)), 1)
-        for first in range(0, len(self.segments), most):
-            yield slice(first, min(first + most, len(self.segments)))
+        Parameters are those of `runs`.
+        """
+        scale = self._deviation * (1.0 - self.observer)  # states are those behind a correction
+        for which, starts, states in self.runs(unknowns, theta, z, moves):
+            for s, segment in enumerate(self.segments[which]):
+                e = np.empty((len(states), len(segment.at), 9))
+                at, nu, q = (
+                    np.require(part, float, ('C', 'A', 'W'))  # another kind would be compiled for
+                    for part in (segment.at, segment.nu, segment.q)
+                )
+                with np.errstate(all='ignore'):  # states may be what is left of a divergence
+                    fill_residuals(starts, states, s, at, nu, q, scale, e)
+                yield e
 
     def cost(self, unknowns: Unknowns, theta: np.ndarray, z: np.ndarray) -> float:
         """Sum of squares of residuals, starts and prior."""
-        total = unknowns.prior_cost(theta) + float(((z / self._certain) ** 2).sum())
-        for which in self.slices(1):
-            starts = self.starts(z[None, which], which)
-            states = self.simulate(unknowns, theta[None], starts, which)
-            total += sum(float((e**2).sum()) for e in self.residuals(which, starts, states))
-        return total
+        own = unknowns.prior_cost(theta) + float(((z / self._certain) ** 2).sum())
+        return own + sum(float((e**2).sum()) for e in self.residuals(unknowns, theta, z))
 
     def _derivatives(
         self, unknowns: Unknowns, theta: np.ndarray, z: np.ndarray
     ) -> Iterator[np.ndarray]:
         """Of each segment its residuals and their derivatives (1 + n + 9, r)."""
-        n = len(theta)
-        thetas = np.concatenate([theta[None], theta + STEP * np.eye(n), np.tile(theta, (9, 1))])
-        moves = np.concatenate([np.zeros((1 + n, 9)), STEP * np.eye(9)])[:, None]
-        for which in self.slices(len(thetas)):
-            starts = self.starts(z[which] + moves, which)
-            states = self.simulate(unknowns, thetas, starts, which)
-            for e in self.residuals(which, starts, states):
-                rows = e.reshape(len(thetas), -1)
-                rows[1:] -= rows[0]
-                if max(rows[1:].max(), -rows[1:].min()) >= FARTHEST:  # one has diverged
-                    rows[1:, np.abs(rows[1:]).max(axis=0) >= FARTHEST] = 0.0
-                rows[1:] /= STEP
-                yield rows
+        moves = STEP * np.eye(len(theta) + 10, len(theta) + 9, -1)
+        for e in self.residuals(unknowns, theta, z, moves):
+            rows = e.reshape(len(moves), -1)
+            rows[1:] -= rows[0]
+            if max(rows[1:].max(), -rows[1:].min()) >= FARTHEST:  # one has diverged
+                rows[1:, np.abs(rows[1:]).max(axis=0) >= FARTHEST] = 0.0
+            rows[1:] /= STEP
+            yield rows
 
     def normal(self, unknowns: Unknowns, theta: np.ndarray, z: np.ndarray) -> Normal:
         """Normal equations."""
@@ -228,8 +206,11 @@ class OutputError:
         inner, right = of_starts[..., n:] + np.diag(own), of_starts[..., 0] + z * own
         return Normal(cost, total[1:, 1:], total[0, 1:], of_starts[..., 1:n], inner, right)
 
-    def blocks(self, fit: Fit) -> Blocks:
-        """Normal equations by blocks of time."""
+    def blocks(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+        """Normal equations by blocks of time, starts eliminated: (B, n, n) and (B, n) of theta.
+
+        A block is a segment, a part of one where they are few, or several where they are many.
+        """
         n, S = len(fit.theta), len(self.segments)
         parts, together = -(-BLOCKS // S), -(-S // MOST_BLOCKS)
         A, g = np.zeros((fit.blocks, n, n)), np.zeros((fit.blocks, n))
@@ -241,11 +222,19 @@ class OutputError:
                 b = (s * parts + k) // together
                 A[b] += alone[:, part] @ alone[:, part].T
                 g[b] += alone[:, part] @ r[part]
-        return Blocks(A, g)
+        return A, g
 
     def covariance(self, fit: Fit) -> np.ndarray:
-        """(n, n) of theta, by blocks of time."""
-        return self.blocks(fit).covariance(fit.unknowns.precision(fit.theta)[0])
+        """(n, n) of theta by the jackknife over blocks (the sandwich, without its bias).
+
+        A block counts as one observation, whatever its residuals are correlated with inside. What
+        the prior says is as uncertain as it says itself.
+        """
+        (A, g), (P, _) = self.blocks(fit), fit.unknowns.precision(fit.theta)
+        S = A.sum(axis=0) + P
+        moves = np.linalg.solve(S - A, g[..., None])[..., 0]
+        inverse = np.linalg.inv(S)
+        return (len(g) - 1) / len(g) * moves.T @ moves + inverse @ P @ inverse
 
     def fit(
         self,
@@ -305,20 +294,14 @@ class OutputError:
 
     def misfit(self, fit: Fit) -> Iterator[tuple[Segment, np.ndarray]]:
         """Segments with their residuals (r, 9), in deviations of the noise; 0: not measured."""
-        for which in self.slices(1):
-            starts = self.starts(fit.starts[None, which], which)
-            states = self.simulate(fit.unknowns, fit.theta[None], starts, which)
-            pairs = zip(self.segments[which], self.residuals(which, starts, states), strict=True)
-            yield from ((segment, e[0]) for segment, e in pairs)
+        residuals = self.residuals(fit.unknowns, fit.theta, fit.starts)
+        return zip(self.segments, (e[0] for e in residuals), strict=True)
 
     def growth(self, unknowns: Unknowns, theta: np.ndarray) -> np.ndarray:
         """(n + 1,) by how much a small change of a start has grown since its first second."""
-        found = []
-        for which in self.slices(10):
-            z = np.zeros((10, len(self.segments[which]), 9))
-            z[1:] += STEP * np.eye(9)[:, None]
-            starts = self.starts(z, which)
-            states = self.simulate(unknowns, np.tile(theta, (10, 1)), starts, which)
+        n, z, found = len(theta), np.zeros((len(self.segments), 9)), []
+        moves = STEP * np.eye(n + 10, n + 9, -1)[[0, *range(n + 1, n + 10)]]
+        for _, starts, states in self.runs(unknowns, theta, z, moves):
             nu = np.concatenate([starts[:, :, None, 4:], states[..., 7:]], axis=2)
             nu = np.clip(np.nan_to_num(nu, nan=FARTHEST), -FARTHEST, FARTHEST)
             change = (nu[1:] - nu[:1]) / (STEP * self._deviation[:6])

@@ -102,13 +102,9 @@ def predict(held: Held, vehicle: Vehicle, unknowns: Unknowns, theta: np.ndarray)
     for record, segments in zip(held.record, held.segments, strict=True):
         if segments:
             model = OutputError(vehicle, segments, record.step, np.full(9, np.nan))
-            starts = np.stack([one.start for one in segments])[None]
-            states = [
-                model.simulate(unknowns, theta[None], starts[:, which], which)[0]
-                for which in model.slices(1)
-            ]
-            every = np.concatenate(states)
-            nu = np.nan_to_num(every[..., 7:], nan=DIVERGED)
+            z = np.zeros((len(segments), 9))
+            states = [some[0] for _, _, some in model.runs(unknowns, theta, z)]
+            nu = np.nan_to_num(np.concatenate(states)[..., 7:], nan=DIVERGED)
             found.append(_after(nu, held.horizons / record.step))
     return np.concatenate(found) - held.measured
 

@@ -211,20 +211,16 @@ def compare(errors: Mapping[str, np.ndarray], held: Held, M: np.ndarray) -> list
             drawn = counts @ first / np.maximum(counts @ own, 1e-300)
         for h, horizon in enumerate(held.horizons):
             low, high = np.sqrt(np.quantile(drawn[:, h], [0.025, 0.975]))
-            other = own is not first
             ratio = np.sqrt(first[:, h].sum() / max(own[:, h].sum(), 1e-300))
-            rows.append(
-                {
-                    'predictor': name,
-                    'horizon': float(horizon),
-                    'error': float(np.sqrt(own[:, h].sum() / held.count)),
-                    'linear': _rms(e[:, h, :3]),
-                    'angular': _rms(e[:, h, 3:]),
-                    'ratio': float(ratio) if other else None,
-                    'ratio_low': float(low) if other else None,
-                    'ratio_high': float(high) if other else None,
-                }
-            )
+            ratios = {'ratio': ratio, 'ratio_low': low, 'ratio_high': high}
+            rows.append({
+                'predictor': name,
+                'horizon': float(horizon),
+                'error': float(np.sqrt(own[:, h].sum() / held.count)),
+                'linear': _rms(e[:, h, :3]),
+                'angular': _rms(e[:, h, 3:]),
+                **{k: None if own is first else float(v) for k, v in ratios.items()},
+            })  # fmt: skip
     return rows
 
 

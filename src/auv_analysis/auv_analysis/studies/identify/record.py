@@ -10,6 +10,7 @@ from auv_analysis.bag.tracks import Track, between_gaps, integral, jumps, usual_
 from auv_analysis.metrics.local_polynomials import ORDER, SMALLEST, variance, weights, windows
 from auv_dynamics.kernel.compile import plain
 from auv_dynamics.ros.interface import NANOSECONDS, WRENCH
+from auv_dynamics.vehicle.kinematics import attitude_rate
 from auv_dynamics.vehicle.model import down
 
 LONGEST_STEP, SHORTEST_STEP = 0.05, 0.002  # s, of the grid on which commands are held
@@ -202,18 +203,8 @@ def small_rotation(q: np.ndarray, p: np.ndarray) -> np.ndarray:
 
 def rotated(q: np.ndarray, by: np.ndarray) -> np.ndarray:
     """Attitudes (..., 4) turned by small rotations (..., 3) in rad, body axes."""
-    half = by / 2.0
-    w, x, y, z = np.moveaxis(q, -1, 0)
-    b, c, d = np.moveaxis(half, -1, 0)
-    turned = np.stack(
-        [
-            w - x * b - y * c - z * d,
-            x + w * b + y * d - z * c,
-            y + w * c + z * b - x * d,
-            z + w * d + x * c - y * b,
-        ],
-        axis=-1,
-    )
+    nu = (0.0, 0.0, 0.0, *np.moveaxis(by, -1, 0))  # for a second
+    turned = q + np.stack(plain(attitude_rate)(tuple(np.moveaxis(q, -1, 0)), nu), axis=-1)
     return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
 
 

@@ -6,13 +6,14 @@ the result: it is a start and nothing else.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from auv_analysis.bag.tracks import usual_interval
 from auv_analysis.metrics.local_polynomials import SMALLEST, rates
 from auv_analysis.studies.identify.record import Record, continuous, down_of, smoothed
-from auv_analysis.studies.identify.unknowns import LOWER, Coefficients, Unknowns
+from auv_analysis.studies.identify.unknowns import LOWER, Unknowns
 from auv_dynamics.kernel.compile import plain
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.model import coriolis
@@ -53,9 +54,7 @@ def least_squares_start(
     if not unknowns.is_delay_free:
         late = float(prior.lag + prior.delay)
         found = normal.solve(late)[1]
-    usual = {'lag': np.maximum(prior.lag, 1e-3), 'delay': prior.delay, 'gain': prior.gain,
-             'bias': prior.bias, 'current': prior.current}  # fmt: skip
-    wanted = Coefficients(**{k: found[k] for k in FITTED}, **usual)
+    wanted = replace(prior, **{k: found[k] for k in FITTED})
     theta = np.clip(unknowns.theta(wanted), -6.0, 6.0)
     return theta, late, reversed_
 

@@ -1,8 +1,8 @@
-"""Small bodies on a vehicle: against kinetic energy, thin spheroids and the decomposition."""
+"""Small bodies on a vehicle: against kinetic energy, and thin spheroids."""
 
 import numpy as np
 import pytest
-from helpers.strategies import QUICK, positive_definite, vectors
+from helpers.strategies import QUICK, vectors
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -14,8 +14,6 @@ from auv_analysis.studies.design.change import (
     normal_of,
     point_mass,
 )
-from auv_analysis.studies.design.prediction import decomposed
-from auv_gvc_controller import decompose
 
 RHO = 1025.0
 angles = st.floats(-90.0, 90.0)
@@ -90,20 +88,3 @@ def test_the_drag_of_a_disc_is_exact_for_one_degree_of_freedom(dof):
     wrench = np.concatenate([force, np.cross(r, force)])
     drag = disc_drag(np.float64(0.3), r, normal, RHO)[dof] * speed**2
     assert drag == pytest.approx(wrench[dof])
-
-
-@QUICK
-@given(positive_definite())
-def test_the_decomposition_is_that_of_the_controller(M):
-    Upsilon, inverse, N = decomposed(np.stack([M, 2 * M]))
-    expected, diagonal = decompose(M)
-    for found in Upsilon:
-        assert_allclose(found, expected, atol=1e-9)
-    assert_allclose(N, [diagonal, 2 * diagonal], rtol=1e-9)
-    assert_allclose(inverse[0] @ Upsilon[0], np.eye(6), atol=1e-9)
-    assert np.array_equal(np.tril(Upsilon[0], -1), np.zeros((6, 6)))
-
-
-def test_an_indefinite_matrix_shows_in_N():
-    M = np.diag([1.0, 1, 1, 1, 1, -1])
-    assert decomposed(M)[2][5] == -1.0

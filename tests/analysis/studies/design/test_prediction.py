@@ -109,6 +109,24 @@ def test_a_change_that_makes_no_inertia_is_impossible(prediction):
     assert (value == 1e6) == (np.linalg.eigvalsh(M)[0] <= 0)
 
 
+def test_couplings_are_those_of_the_decomposition_and_none_where_M_is_no_inertia():
+    nu, tau = np.random.default_rng(0).normal(size=(2, 5, 6))
+    space = SimpleNamespace(vehicle=SimpleNamespace(M=np.eye(6)),
+                            effect=lambda M: SimpleNamespace(M=M, row=M))  # fmt: skip
+    motion = SimpleNamespace(nu=nu, inputs=lambda row: np.broadcast_to(tau, (len(row), 5, 6)))
+    coupled = np.diag(np.arange(1.0, 7.0))
+    coupled[2, 4] = coupled[4, 2] = 1.5
+    changes = np.stack([coupled, -np.eye(6), np.diag([1.0, 1.0, 1.0, 1.0, 1.0, -3.0])])
+    made = SimpleNamespace(space=space, motion=motion)
+    deformed, _, _, _, N, definite = Prediction.signals(made, changes)
+    U, diagonal = decompose(np.eye(6) + coupled)
+    assert definite.tolist() == [True, False, False]
+    assert_allclose(N[0], diagonal)
+    assert_allclose(deformed[0, :, :6], delta_xi(inverse_upper(U), nu))
+    assert_allclose(deformed[0, :, 6:], delta_pi(U, tau))
+    assert not deformed[1:].any()
+
+
 @QUICK
 @given(positive_definite(), vectors(6), st.floats(0.1, 10.0), st.floats(0.1, 10.0))
 def test_shares_and_effort_do_not_depend_on_the_units(M, seed, metre, kilogram):

@@ -18,8 +18,9 @@ from auv_dynamics.files.nearest import one_of
 from auv_dynamics.kernel.compile import plain
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.kinematics import quaternion, rotation
-from auv_dynamics.vehicle.model import acceleration
+from auv_dynamics.vehicle.model import acceleration, coriolis
 from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_dynamics.vehicle.vehicle_file import is_definite
 from auv_gvc_controller.laws.model import control_model, decompose, inverse_upper
 
 KINDS = ('delta_xi', 'delta_pi')
@@ -188,13 +189,10 @@ def added_wrench(
     dtau : (n, 6) N, N m
 
     """
-    v, omega = nu[:, :3], nu[:, 3:]
-    momentum = nu @ change.M.T
-    linear, angular = momentum[:, :3], momentum[:, 3:]
-    dtau = nu_dot @ change.M.T + np.abs(nu) * nu * change.drag
-    dtau[:, :3] += np.cross(omega, linear)
-    dtau[:, 3:] += np.cross(v, linear) + np.cross(omega, angular)
-    dtau[:, 3:] += np.cross(down, np.broadcast_to(change.couple, down.shape))
+    columns = tuple(nu.T)
+    turning = plain(coriolis)(change.M.ravel(), columns, columns)
+    dtau = nu_dot @ change.M + np.stack(turning, axis=1) + np.abs(nu) * nu * change.drag
+    dtau[:, 3:] += np.cross(down, change.couple)
     return dtau
 
 
@@ -258,16 +256,6 @@ class Metrics(NamedTuple):
     definite: Any
 
 
-class CouplingSignals(NamedTuple):
-    """Of changed vehicles: delta_xi beside delta_pi (..., n, 12), xi, pi, tau (..., n, 6), N."""
-
-    deformed: np.ndarray
-    xi: np.ndarray
-    pi: np.ndarray
-    tau: np.ndarray
-    N: np.ndarray
-
-
 class Prediction:
     """Predicted couplings of a changed vehicle that moves as in a run.
 
@@ -290,34 +278,45 @@ class Prediction:
         self.space, self.motion, self.before = space, motion, before
         self._M_inv = np.linalg.inv(space.vehicle.M)  # weighs the effort
         if smooth is None:
-            peaks = smooth_peak(self.signals(space.unchanged).deformed)
+            peaks = smooth_peak(self.signals(space.unchanged)[0])
             smooth = np.where(peaks > 0, peaks, np.inf)
         self.smooth = smooth
 
     def metrics(self, x: np.ndarray, targets: tuple[int, ...] = EVERY) -> Metrics:
         """Metrics of changes (..., 13); `targets` are places in `COUPLINGS`."""
-        (deformed, xi, pi, tau, N), weights = self.signals(x), self.motion.weights
+        (deformed, xi, pi, tau, N, definite), weights = self.signals(x), self.motion.weights
         return Metrics(
             ratios=smooth_peak(deformed[..., targets]) / self.smooth[list(targets)],
             shares=shares_of(deformed[..., :6], deformed[..., 6:], N, xi, pi, weights),
             effort=effort_of(tau, self._M_inv, weights) / self.before.by_effort,
             at_rest=self.space.hydrostatic_penalty(x),
             size=self.space.size(x),
-            definite=(N > 0).all(axis=-1),
+            definite=definite,
         )
 
     def ratios(self, x: np.ndarray) -> np.ndarray:
         """Predicted largest magnitudes (12,) after a change (13,), by those before; 0 by 0 is 0."""
-        peaks = np.abs(self.signals(x).deformed).max(axis=-2)
+        peaks = np.abs(self.signals(x)[0]).max(axis=-2)
         return peaks / np.where(self.before.peaks > 0, self.before.peaks, np.inf)
 
-    def signals(self, x: np.ndarray) -> CouplingSignals:
-        """Signals of changes (..., 13) at the samples of the motion."""
+    def signals(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Of changes (..., 13) at the samples of the motion.
+
+        Returns
+        -------
+        deformed : (..., n, 12) delta_xi beside delta_pi
+        xi, pi, tau : (..., n, 6)
+        N : (..., 6)
+        definite : (...) whether M is positive definite; else Upsilon and N are those of I
+
+        """
         change = self.space.effect(x)
-        Upsilon, inverse, N = decomposed(self.space.vehicle.M + change.M)
+        M = self.space.vehicle.M + change.M
+        definite = is_definite(M)
+        Upsilon, N = decompose(np.where(definite[..., None, None], M, np.eye(6)))
         tau, nu = self.motion.inputs(change.row), self.motion.nu
-        xi, pi = nu @ np.swapaxes(inverse, -2, -1), tau @ Upsilon
-        return CouplingSignals(np.concatenate([xi - nu, pi - tau], axis=-1), xi, pi, tau, N)
+        xi, pi = nu @ np.swapaxes(inverse_upper(Upsilon), -2, -1), tau @ Upsilon
+        return np.concatenate([xi - nu, pi - tau], axis=-1), xi, pi, tau, N, definite
 
 
 def smooth_peak(signals: np.ndarray) -> np.ndarray:
@@ -326,32 +325,6 @@ def smooth_peak(signals: np.ndarray) -> np.ndarray:
     squares *= squares
     squares *= squares  # a power of eight takes ten times as long
     return squares.mean(axis=-2) ** 0.125
-
-
-def decomposed(M: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Upsilon, its inverse and N of matrices M = Upsilon^-T N Upsilon^-1, (4) and (9).
-
-    Parameters
-    ----------
-    M : (..., 6, 6) symmetric; where it is not positive definite, N has a pivot that is not positive
-
-    Returns
-    -------
-    Upsilon, Upsilon_inv : (..., 6, 6) upper triangular, unit diagonal
-    N : (..., 6)
-
-    """
-    rest = np.array(M)
-    upper = np.zeros_like(rest)  # L^T of M = L N L^T
-    N = np.zeros(rest.shape[:-1], rest.dtype)
-    with np.errstate(all='ignore'):
-        for k in range(6):
-            N[..., k] = rest[..., k, k]
-            upper[..., k, k:] = rest[..., k, k:] / N[..., k, None]
-            upper[..., k, k] = 1.0
-            row = upper[..., k, :]
-            rest = rest - N[..., k, None, None] * row[..., :, None] * row[..., None, :]
-        return inverse_upper(upper), upper, N
 
 
 def _without(shares: np.ndarray, target: int) -> np.ndarray:

@@ -93,7 +93,7 @@ def _linear(nu: np.ndarray, rate: np.ndarray, d: np.ndarray) -> np.ndarray:
         E = np.zeros((6, 6))
         E[i, j] = E[j, i] = 1.0
         terms = plain(coriolis)(E.ravel(), columns, columns)
-        Y[:, :, k] = rate @ E + np.stack(np.broadcast_arrays(*terms), axis=1)
+        Y[:, :, k] = rate @ E + np.stack(terms, axis=1)
     for i in range(6):
         Y[:, i, 21 + i], Y[:, i, 27 + i] = nu[:, i], nu[:, i] * np.abs(nu[:, i])
     Y[:, :3, 33] = -d

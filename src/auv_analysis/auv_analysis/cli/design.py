@@ -36,10 +36,11 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     if options.reduce is not None:
         coupling_named(options.reduce, present(setting.space.vehicle))
     out = options.out or Path('runs') / plain_name('design', setting.space.vehicle.name)
-    with results_folder(out, overwrite=options.overwrite, inputs=setting.inputs) as results:
-        for warning in setting.scenario.warnings:
+    scenario = setting.scenario
+    with results_folder(out, overwrite=options.overwrite, inputs=scenario.inputs) as results:
+        for warning in scenario.warnings:
             say(f'warning: {warning}')
-        announce(setting.scenario, [setting.controller])
+        announce(scenario, [setting.controller])
         with bar(count('couplings')) as shown:
             task = shown.add_task('searching', total=1)
             proposal = propose(

@@ -475,14 +475,14 @@ def test_the_report_and_its_numbers(short, tmp_path, capsys, approved):
 
 def test_a_vehicle_that_rights_itself_less_is_warned_of(approved):
     vehicle = load_vehicle('rexrov')
-    worse = replace(vehicle, r_G=np.array([0.05, 0.0, -0.1]))
-    upside = replace(vehicle, r_G=np.array([0.0, 0.0, -0.5]))
-    assert warnings_of(vehicle, vehicle) == []
-    falls, tilts = warnings_of(vehicle, worse)
+    places = (vehicle.r_G, [0.05, 0.0, -0.1], [0.0, 0.0, -0.5])
+    own, worse, upside = (results.rest_of(replace(vehicle, r_G=np.array(r))) for r in places)
+    assert warnings_of(own, own) == []
+    falls, tilts = warnings_of(own, worse)
     assert 'falls from 5561 to 3734 N m' in falls.replace('\u202f', '')
     assert 'tilts by' in tilts
     approved.add([falls, tilts])
-    assert warnings_of(vehicle, upside) == ['the changed vehicle is statically unstable']
+    assert warnings_of(own, upside) == ['the changed vehicle is statically unstable']
     apart = replace(vehicle, r_G=np.array([0.1, -0.2, 0.3]), r_B=np.array([0.0, 0.1, -0.4]))
     W, B = vehicle.weight, vehicle.buoyancy
     rights = 0.3 * W + 0.4 * B
@@ -492,7 +492,19 @@ def test_a_vehicle_that_rights_itself_less_is_warned_of(approved):
         'stability': pytest.approx(rights), 'tilt_at_rest_deg': pytest.approx(
             np.degrees(np.arctan(np.hypot(0.1 * W, -0.2 * W - 0.1 * B) / rights))),
     }  # fmt: skip
-    assert results.rest_of(upside)['tilt_at_rest_deg'] is None
+    assert upside['tilt_at_rest_deg'] is None
+
+
+@pytest.mark.parametrize(('stable', 'tilted', 'said'), [
+    (5.0, 2.99, ''), (5.0, 3.01, 'tilts by 3.0 deg, before 2.0'), (5.0, None, ''), (5.1, 2.0, ''),
+    (4.99, 2.0, 'falls from 5.00 to 4.99 N m'), (0.0, None, 'statically unstable'),
+])  # fmt: skip
+def test_a_degree_more_of_tilt_and_less_of_stability_are_warned_of(stable, tilted, said):
+    before, after = ({'stability': z, 'tilt_at_rest_deg': angle}
+                     for z, angle in ((5.0, 2.0), (stable, tilted)))  # fmt: skip
+    found = warnings_of(before, after)
+    assert (len(found), said in ''.join(found)) == (bool(said), True)
+    assert warnings_of({**before, 'tilt_at_rest_deg': None}, before) == []
 
 
 def test_what_lies_on_a_bound_or_outside_the_hull_is_warned_of():

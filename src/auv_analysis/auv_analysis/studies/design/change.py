@@ -147,7 +147,7 @@ def spread(mass: float, r: np.ndarray) -> np.ndarray:
 def _stable(vehicle: Vehicle, found: tuple[Any, ...]) -> tuple[Any, ...]:
     """Bounds of `shift.z`: as much static stability as must be left is left."""
     unit, lower, upper, reason = found
-    stability = vehicle.weight * vehicle.r_G[2] - vehicle.buoyancy * vehicle.r_B[2]
+    stability = vehicle.model.hydrostatics[3]
     room = -(1 - KEPT) * stability / vehicle.weight if stability > 0 else 0.0
     if room <= lower:
         return found
@@ -326,7 +326,7 @@ class ChangeSpace:
         """
         vehicle, change = self.vehicle, self.vehicle.weight * x[..., 0:3]
         length = float(semi_axes(vehicle, self.data)[0].mean())
-        before = vehicle.weight * vehicle.r_G - vehicle.buoyancy * vehicle.r_B
+        before = vehicle.model.hydrostatics[1:]
         rights = max(before[2], LEAST_RIGHTING * vehicle.weight * length)
         turns = (((before + change)[..., :2] ** 2).sum(axis=-1) - before[:2] @ before[:2]) / (
             before[:2] @ before[:2] + rights**2

@@ -50,14 +50,11 @@ ASSUMPTIONS = (
     'its drag counts in each degree of freedom by itself.',
     'The damping is otherwise that of the file, and the controllers keep their gains.',
 )
-TILT = np.radians(1.0)  # more of it at rest is worth a warning
+TILT = 1.0  # deg: more of it at rest is worth a warning
 WORSE = 1.1  # times: from which on a side effect is named
 NEGLIGIBLE = 1e-3  # of the largest of its kind and unit: not worth a word
 MOST = 6  # side effects that are named
-COSTS = (
-    'delta_xi_max', 'delta_pi_max', 'effort.rms', 'effort.max', 'velocity_error.rms',
-    'velocity_error.max_after_2s',
-)  # fmt: skip
+COSTS = tuple(m.removeprefix('coupling.') for m in MEASURES if not m.startswith('kinetic_'))
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,6 +188,7 @@ def _body(found: Proposal, changed: Vehicle, before: Simulated, after: Simulated
     rows = measures(before.summaries[main], after.summaries[main], coupled)
     parameters = _parameters(found, x)
     effects = side_effects(rows, COUPLINGS[target])
+    rest = {'before': rest_of(vehicle), 'after': rest_of(changed)}
     largest = after.summaries[main]['effort']['max']
     by = f'simulated with {main} ({setting.hold})'
     return {
@@ -207,13 +205,13 @@ def _body(found: Proposal, changed: Vehicle, before: Simulated, after: Simulated
         'parameters': parameters,
         'ranking': _ranking(found, changed),
         'alternatives': [_candidate(one, one is best) for one in found.candidates],
-        'at_rest': {'before': rest_of(vehicle), 'after': rest_of(changed)},
+        'at_rest': rest,
         'controllers': _controllers(before, after, coupled),
         'assumptions': list(ASSUMPTIONS),
         'side_effects': effects,
         'warnings': [
             *side_effect_warnings(effects),
-            *warnings_of(vehicle, changed),
+            *warnings_of(**rest),
             *bound_warnings(parameters),
             *place_warnings(setting.space, x),
             *beyond_authority(changed, largest),
@@ -324,20 +322,19 @@ def result_statement(
     return text
 
 
-def warnings_of(before: Vehicle, after: Vehicle) -> list[str]:
-    """Deterioration of the vehicle at rest."""
+def warnings_of(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
+    """Deterioration of the vehicle at rest; before and after are those of `rest_of`."""
     found = []
-    stable, now = stability(before), stability(after)
+    stable, now = before['stability'], after['stability']
     if now <= 0 < stable:
         found.append('the changed vehicle is statically unstable')
     elif now < stable - 1e-9 * abs(stable):
         found.append(
             f'the static stability W z_G - B z_B falls from {number(stable)} to {number(now)} N m'
         )
-    level, tilted = tilt(before), tilt(after)
+    level, tilted = before['tilt_at_rest_deg'], after['tilt_at_rest_deg']
     if level is not None and tilted is not None and tilted > level + TILT:
-        angles = (np.degrees(angle) for angle in (tilted, level))
-        found.append('at rest it tilts by {:.1f} deg, before {:.1f}'.format(*angles))
+        found.append(f'at rest it tilts by {tilted:.1f} deg, before {level:.1f}')
     return found
 
 
@@ -413,20 +410,12 @@ def side_effect_warnings(effects: Sequence[Mapping[str, Any]]) -> list[str]:
     return [f'side effects above {100 * (WORSE - 1):.0f} %: {join(named)}']
 
 
-def stability(vehicle: Vehicle) -> float:
-    """W z_G - B z_B in N m: positive where it rights itself."""
-    return float(vehicle.weight * vehicle.r_G[2] - vehicle.buoyancy * vehicle.r_B[2])
-
-
-def tilt(vehicle: Vehicle) -> float | None:
-    """Angle in rad from level to where it rests; None where it does not right itself."""
-    x, y, z = vehicle.weight * vehicle.r_G - vehicle.buoyancy * vehicle.r_B
-    return float(np.arctan2(np.hypot(x, y), z)) if z > 0 else None
-
-
 def rest_of(vehicle: Vehicle) -> dict[str, Any]:
-    """Hydrostatics that a change can touch: N, N m, m, deg; None where it does not rest."""
-    angle = tilt(vehicle)
+    """Hydrostatics that a change can touch: N, N m, m, deg; no tilt where it does not rest.
+
+    `stability` is W z_G - B z_B, positive where the vehicle rights itself.
+    """
+    x, y, z = vehicle.model.hydrostatics[1:].tolist()
     return {
         'weight': float(vehicle.weight),
         'buoyancy': float(vehicle.buoyancy),
@@ -434,6 +423,6 @@ def rest_of(vehicle: Vehicle) -> dict[str, Any]:
         'r_G': vehicle.r_G.tolist(),
         'r_B': vehicle.r_B.tolist(),
         'metacentric_height': float(vehicle.r_G[2] - vehicle.r_B[2]),
-        'stability': stability(vehicle),
-        'tilt_at_rest_deg': None if angle is None else float(np.degrees(angle)),
+        'stability': z,
+        'tilt_at_rest_deg': float(np.degrees(np.arctan2(np.hypot(x, y), z))) if z > 0 else None,
     }

@@ -1,7 +1,7 @@
 """The experiment by which a design is judged: a scenario with the vehicle in it."""
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -177,15 +177,11 @@ class Setting:
     ----------
     scenario : with the unchanged vehicle
     space : of its changes
-    vehicle_text : of the unchanged vehicle's file
-    inputs : files that were read
 
     """
 
     scenario: Scenario
     space: ChangeSpace
-    vehicle_text: str
-    inputs: tuple[Path, ...]
 
     @property
     def controller(self) -> str:
@@ -204,14 +200,11 @@ class Setting:
         one = self.scenario
         return is_compiled(one.gains(self.controller)) and one.steps <= MANY_STEPS
 
-    def with_vehicle(self, data: Mapping[str, Any]) -> Scenario:
-        """The same scenario with another vehicle, checked as if it had been written so."""
-        one = self.scenario
-        return scenario_from(one.data, dict(data), one.path, one.vehicle_path, one.attachments)
-
     def simulated(self, x: np.ndarray) -> tuple[Run, Sizes]:
         """Run of a changed vehicle and the sizes of its couplings."""
-        run = simulate(self.with_vehicle(changed_data(self.space, x)), self.controller, self.hold)
+        one, data = self.scenario, changed_data(self.space, x)
+        made = scenario_from(one.data, data, one.path, one.vehicle_path, one.attachments)
+        run = simulate(made, self.controller, self.hold)
         return run, sizes_of(run, np.linalg.inv(self.space.vehicle.M))
 
 
@@ -244,8 +237,7 @@ def open_setting(
         attachments['setpoint.csv'] = read_text(csv, 'CSV set-point')
         contents['setpoint'] = {'file': str(csv.resolve())}
     contents['vehicle'] = str(vehicle_path.resolve())
-    made = scenario_from(contents, data, path, vehicle_path, attachments)
-    return Setting(made, space, text, tuple(made.inputs))
+    return Setting(scenario_from(contents, data, path, vehicle_path, attachments), space)
 
 
 def _contents(vehicle: str, scenario: str | None) -> tuple[Path, dict[str, Any]]:
@@ -271,8 +263,9 @@ def write_inputs(setting: Setting, x: np.ndarray | None, target: str, out: Path)
     out : folder
 
     """
-    (out / 'vehicle_before.yaml').write_text(setting.vehicle_text, encoding='utf-8')
-    text = setting.vehicle_text
+    one = setting.scenario
+    text = one.attachments['vehicle.yaml']
+    (out / 'vehicle_before.yaml').write_text(text, encoding='utf-8')
     if x is not None:
         words = '; '.join(change_words(setting.space, x))
         about = (
@@ -280,7 +273,6 @@ def write_inputs(setting: Setting, x: np.ndarray | None, target: str, out: Path)
             'vehicle_before.yaml beside it is the vehicle as it was, with its comments.'
         )
         text = changed_text(changed_data(setting.space, x, words), about)
-    one = setting.scenario
     changed = replace(
         one, path=Path(one.name), data={**one.data, 'name': f'{one.name[:LONGEST]}_changed'},
         attachments={**one.attachments, 'vehicle.yaml': text},

@@ -51,13 +51,10 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.output.progress import bar, count, say, waiting
     from auv_analysis.scenario.scenario import load_scenario
     from auv_analysis.simulation.simulate import announce
-    from auv_analysis.studies.tune.perturbations import Perturbations, spread_of
     from auv_analysis.studies.tune.results import tune
 
     scenario = load_scenario(options.scenario)
     request = _request(options, scenario)
-    spread = spread_of(options.spread or (), scenario.vehicle)
-    asked = Perturbations(options.samples, spread, request.seed)
     out = options.out or Path('runs') / f'tune_{scenario.name}'
     with results_folder(out, overwrite=options.overwrite, inputs=scenario.inputs) as results:
         for warning in scenario.warnings:
@@ -69,7 +66,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
                 task = shown.add_task(text, total=parts)
                 return lambda: shown.advance(task)
 
-            tuning = tune(request, asked, results.folder, stage)
+            tuning = tune(request, results.folder, stage)
         from auv_analysis.studies.tune.report import print_tuning, write_report  # with matplotlib
 
         with waiting('drawing plots, writing the report'):
@@ -80,6 +77,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
 def _request(options: argparse.Namespace, scenario: Scenario) -> Request:
     from auv_analysis.simulation.simulate import check_hold
+    from auv_analysis.studies.tune.perturbations import spread_of
     from auv_analysis.studies.tune.search import Request
 
     check_hold(scenario, options.hold)
@@ -91,7 +89,8 @@ def _request(options: argparse.Namespace, scenario: Scenario) -> Request:
     return Request(
         scenario, reference, tuple(dict.fromkeys(laws)), options.equal, INDICES[options.index],
         options.tolerance, options.structure, options.hold, options.seed,
-        len(os.sched_getaffinity(0)),
+        len(os.sched_getaffinity(0)), options.samples,
+        spread_of(options.spread or (), scenario.vehicle),
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from scipy.stats import binomtest, rankdata
 
 from auv_analysis.studies.pairs import MOST, NEVER, holm, log_ratios, paired
 from auv_analysis.studies.tune.cost import Measures
-from auv_analysis.studies.tune.perturbations import Perturbations, Spread, monte_carlo
+from auv_analysis.studies.tune.perturbations import Spread, monte_carlo
 from auv_analysis.studies.tune.results import COMPARED, _deviation, _distribution, compare
 
 
@@ -20,7 +20,7 @@ def measures(values: np.ndarray) -> Measures:
 def test_laws_that_are_one_on_a_diagonal_M_tie_in_every_draw(tmp_path) -> None:
     """GVC with k_D, Gamma is CL with k_D M, Gamma M: no draw may tell them apart."""
     same = scenario(tmp_path, {'gvc': GVC, 'cl': SAME_CL})
-    found = monte_carlo(same, Perturbations(20, Spread(), 0), 'continuous', 1)
+    found = monte_carlo(same, Spread(), 20, 0, 'continuous', 1)
     for row in compare(found, [('cl', 'gvc')]):
         assert (row.smaller, row.larger, row.p, row.p_holm, row.verdict) == (0, 0, 1, 1, 0)
         assert row.ratio == 1.0
@@ -29,7 +29,7 @@ def test_laws_that_are_one_on_a_diagonal_M_tie_in_every_draw(tmp_path) -> None:
 
 def test_laws_that_differ_do_not_tie(tmp_path) -> None:
     other = scenario(tmp_path, {'gvc': GVC, 'cl': SAME_CL | {'k_D': 300.0}})
-    found = monte_carlo(other, Perturbations(20, Spread(), 0), 'continuous', 1)
+    found = monte_carlo(other, Spread(), 20, 0, 'continuous', 1)
     rows = {row.measure: row for row in compare(found, [('cl', 'gvc')])}
     assert rows['error'].verdict != 0
     assert rows['error'].p_holm < 1e-3

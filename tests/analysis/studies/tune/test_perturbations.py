@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from auv_analysis import load_scenario
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.studies.tune.perturbations import (
-    Perturbations,
     Spread,
     applicable,
     monte_carlo,
@@ -139,13 +138,11 @@ def test_every_controller_meets_the_same_draws(tmp_path) -> None:
     both = scenario(tmp_path, {'gvc': GVC, 'again': GVC, 'cl': SAME_CL | {'k_D': 300.0}})
     alone = changed_scenario(both, {'controllers': {'cl': both.controllers['cl']}})
     done: list[None] = []
-    asked = Perturbations(12, Spread(), 3)
-    found = monte_carlo(both, asked, 'continuous', 2, lambda: done.append(None))
+    asked = Spread(), 12, 3, 'continuous'
+    found = monte_carlo(both, *asked, 2, lambda: done.append(None))
     assert len(done) == 12
     np.testing.assert_array_equal(found['gvc'], found['again'])
-    np.testing.assert_array_equal(
-        found['cl'], monte_carlo(alone, Perturbations(12, Spread(), 3), 'continuous', 1)['cl']
-    )
+    np.testing.assert_array_equal(found['cl'], monte_carlo(alone, *asked, 1)['cl'])
     assert len(set(found['gvc'].error.tolist())) == 12
 
 

@@ -14,7 +14,7 @@ from auv_analysis.studies.tune import results as tuning
 from auv_analysis.studies.tune import search as searching
 from auv_analysis.studies.tune.cost import Measures, measures_of_run, of_each
 from auv_analysis.studies.tune.gain_space import make_space
-from auv_analysis.studies.tune.perturbations import Perturbations, Spread, perturbed
+from auv_analysis.studies.tune.perturbations import Spread, perturbed
 from auv_analysis.studies.tune.report import FAIR
 from auv_analysis.studies.tune.results import _checked, _evaluations, tune
 from auv_analysis.studies.tune.search import Goal, Request, TunedLaw, search, tuned
@@ -222,10 +222,10 @@ def test_a_sampled_scenario_is_tuned_with_its_noise_and_in_its_hold(tmp_path) ->
         tmp_path, {'gvc': GVC}, name='n' * 100, setpoint={'file': 'way.csv'}, seed=9, duration=0.1,
         sensors={'velocity_noise': 0.1}, actuators={'lag': 0.05},
     )  # fmt: skip
-    request = Request(base, 'gvc', ('gvc',), 'effort', 'error', 1e-3, 'scalar', 'zoh', 0, 1)
+    request = Request(base, 'gvc', ('gvc',), 'effort', 'error', 1e-3, 'scalar', 'zoh', 3, 1, 2)
     out = tmp_path / 'out'
     out.mkdir()
-    found = tune(request, Perturbations(2, Spread(), 3), out, lambda *_: lambda: None)
+    found = tune(request, out, lambda *_: lambda: None)
     draw = perturbed(found.scenario, Spread(), 3, 1)
     for measures, one, name in (
         (found.goal.reference, base, 'gvc'),

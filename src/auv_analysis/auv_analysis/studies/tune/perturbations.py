@@ -46,15 +46,6 @@ class Spread:
     current: float = 0.1
 
 
-@dataclass(frozen=True)
-class Perturbations:
-    """Perturbed plants that are asked for: how many, how far they go, and their seed."""
-
-    samples: int
-    spread: Spread
-    seed: int
-
-
 def spread_of(texts: Iterable[str], vehicle: Vehicle) -> Spread:
     """Spread of the command line: NAME=VALUE each, the others as they are.
 
@@ -89,7 +80,7 @@ def applicable(spread: Spread, vehicle: Vehicle) -> dict[str, float]:
 
 
 def monte_carlo(
-    scenario: Scenario, asked: Perturbations, hold: Hold, threads: int,
+    scenario: Scenario, spread: Spread, samples: int, seed: int, hold: Hold, threads: int,
     progress: Callable[[], None] = lambda: None,
 ) -> dict[str, Measures]:  # fmt: skip
     """Measures of every controller of a scenario over the same draws.
@@ -97,7 +88,7 @@ def monte_carlo(
     Parameters
     ----------
     scenario : with the controllers to compare
-    asked : one sample at least
+    spread, samples, seed : of the draws, one at least
     hold : 'continuous' or 'zoh'
     threads : how many draws run at a time
     progress : called after each draw
@@ -109,14 +100,14 @@ def monte_carlo(
     """
 
     def one(index: int) -> dict[str, Measures]:
-        measures = of_each(perturbed(scenario, asked.spread, asked.seed, index), hold)
+        measures = of_each(perturbed(scenario, spread, seed, index), hold)
         progress()
         return measures
 
     rows = [one(0)]  # alone: it may compile
     with ThreadPoolExecutor(threads) as pool:
         try:
-            rows += pool.map(one, range(1, asked.samples))
+            rows += pool.map(one, range(1, samples))
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
@@ -183,24 +174,16 @@ def _scaled(spec: Mapping[str, Any], factor: float, rng: np.random.Generator) ->
 def _model_error(vehicle: Vehicle, spread: Spread, rng: np.random.Generator) -> dict[str, Any]:
     """Relative errors; where M_RB and M_A are not apart, matrices dM and dD of that size."""
     error: dict[str, Any] = {'kind': 'model_error'}
-    unit = dict(
-        zip(('mass', 'added_mass', 'damping', 'buoyancy'), rng.uniform(-1, 1, 4), strict=True)
-    )
-    directions, sizes, axes = (
-        rng.standard_normal((6, 6)),
-        rng.uniform(-1, 1, 6),
-        rng.uniform(-1, 1, 6),
-    )
-    if spread.buoyancy:
-        error['buoyancy'] = spread.buoyancy * unit['buoyancy']
-    if vehicle.M_RB is not None:
-        for name in ('mass', 'added_mass', 'damping'):
-            if getattr(spread, name):
-                error[name] = getattr(spread, name) * unit[name]
-        return error
-    if spread.inertia:
+    units = rng.uniform(-1, 1, 4).tolist()
+    directions = rng.standard_normal((6, 6))
+    sizes, axes = rng.uniform(-1, 1, (2, 6))
+    apart = vehicle.M_RB is not None
+    for name, unit in zip(('mass', 'added_mass', 'damping', 'buoyancy'), units, strict=True):
+        if getattr(spread, name) and (apart or name == 'buoyancy'):
+            error[name] = getattr(spread, name) * unit
+    if spread.inertia and not apart:
         error['dM'] = _relative(vehicle.M, directions, spread.inertia * sizes).tolist()
-    if spread.damping:
+    if spread.damping and not apart:
         root = np.sqrt(1 + spread.damping * axes)  # of each axis: what dissipates goes on to do so
         error['dD'] = (np.outer(root, root) * vehicle.D_linear - vehicle.D_linear).tolist()
     return error

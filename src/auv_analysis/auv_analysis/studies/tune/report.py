@@ -103,17 +103,16 @@ def write_report(tuning: Tuning, out: Path) -> None:
 def print_tuning(tuning: Tuning) -> None:
     """Print the controllers with their measures, and what the tuning found."""
     table = controllers_table(tuning.results)
-    brief: dict[str, Shown] = {
-        'controller': 'controller',
-        'structure': 'structure',
+    brief = {
+        'controller': Column('controller'),
+        'structure': Column('structure'),
         tuning.request.index: described('error', unit='J'),
         'effort': described('effort', unit='J/s²', digits=4),
         'equality': Column('equality', digits=2, scale=100.0),
         'settling': described('settled', unit='s'),
-        'ratio': 'draws',
+        'ratio': Column('draws'),
     }
-    shown = {n: c if isinstance(c, Column) else Column(c) for n, c in brief.items()}
-    console.print(terminal(replace(table, shown=shown)))
+    console.print(terminal(replace(table, shown=brief)))
     for sentence in tuning.results.facts['verdict']:
         say(sentence['text'])
 

@@ -19,7 +19,7 @@ from auv_analysis.simulation.simulate import DivergedError, simulate
 from auv_analysis.studies.pairs import Pairs, holm, log_ratios, paired
 from auv_analysis.studies.tune.cost import Measures, measures_of_run, of_each
 from auv_analysis.studies.tune.gain_space import STRUCTURES
-from auv_analysis.studies.tune.perturbations import Perturbations, Spread, applicable, monte_carlo
+from auv_analysis.studies.tune.perturbations import applicable, monte_carlo
 from auv_analysis.studies.tune.search import Goal, Request, TunedLaw, structures_of, tuned
 from auv_dynamics.files.errors import FailedError
 from auv_gvc_controller.laws.law import SHIPPED
@@ -94,7 +94,6 @@ class Tuning:
     nominal : controller -> measures (1,) in the scenario itself
     deviation : largest relative difference of these to the same from `simulate`
     commands : controller -> largest magnitudes (6,) of its command, N and N m; not of diverged ones
-    spread : of the draws
     draws : controller -> measures (n,), row i of the same draw; empty without Monte Carlo
 
     """
@@ -106,7 +105,6 @@ class Tuning:
     nominal: Mapping[str, Measures]
     deviation: float
     commands: Mapping[str, np.ndarray]
-    spread: Spread
     draws: Mapping[str, Measures]
 
     @property
@@ -159,7 +157,7 @@ class Tuning:
             comparisons = [asdict(c) | {'verdict': c.verdict} for c in self.comparisons]
             facts['monte_carlo'] = {
                 'samples': len(self.draws[request.reference].error),
-                'spread': applicable(self.spread, request.scenario.vehicle),
+                'spread': applicable(request.spread, request.scenario.vehicle),
                 'controllers': {name: _distribution(self.draws[name]) for name in names},
                 'comparisons': comparisons,
             }
@@ -278,7 +276,7 @@ LONGEST = 100  # characters of a scenario's name
 Progress = Callable[[str, int], Callable[[], None]]  # what is done, in how many parts -> a part is
 
 
-def tune(request: Request, asked: Perturbations, out: Path, progress: Progress) -> Tuning:
+def tune(request: Request, out: Path, progress: Progress) -> Tuning:
     """Tune, check, perturb and compare; `scenario.yaml` with its files is written to `out` first.
 
     Raises
@@ -297,10 +295,13 @@ def tune(request: Request, asked: Perturbations, out: Path, progress: Progress) 
     nominal = of_each(scenario, request.hold)
     deviation, commands = _checked(scenario, request, nominal, progress)
     draws: dict[str, Measures] = {}
-    if asked.samples:
-        advance = progress(f'{asked.samples} draws of model error and disturbance', asked.samples)
-        draws = monte_carlo(scenario, asked, request.hold, request.threads, advance)
-    return Tuning(request, goal, scenario, laws, nominal, deviation, commands, asked.spread, draws)
+    if request.samples:
+        what = f'{request.samples} draws of model error and disturbance'
+        draws = monte_carlo(
+            scenario, request.spread, request.samples, request.seed, request.hold, request.threads,
+            progress(what, request.samples),
+        )  # fmt: skip
+    return Tuning(request, goal, scenario, laws, nominal, deviation, commands, draws)
 
 
 def _free(name: str, scenario: Scenario) -> str:

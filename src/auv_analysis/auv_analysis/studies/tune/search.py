@@ -7,7 +7,7 @@ to its digits and not within a band.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from auv_analysis.simulation.simulate import DivergedError
 from auv_analysis.studies.optimise import DIFFERENCE, GRADIENT, WEIGHT, Search, sobol_points
 from auv_analysis.studies.tune.cost import Measures, joined, measured
 from auv_analysis.studies.tune.gain_space import BEST, EDGE, GainSpace, make_space, starts_of
+from auv_analysis.studies.tune.perturbations import Spread
 from auv_dynamics.files.errors import InputError
 from auv_gvc_controller.control.gains import body_gains, sampled_rate
 from auv_gvc_controller.laws.law import make_gains
@@ -47,8 +48,9 @@ class Request:
     equal, index, tolerance : see `Goal`
     structure : a key of `STRUCTURES`, or 'best'
     hold : 'continuous' or 'zoh'
-    seed : of the search
+    seed : of search and draws
     threads : how many to use
+    samples, spread : draws of perturbed plants by which laws are compared, and how far they go
 
     """
 
@@ -62,6 +64,8 @@ class Request:
     hold: Hold
     seed: int
     threads: int
+    samples: int = 0
+    spread: Spread = field(default_factory=Spread)
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ class GainSpace:
     structure : a key of `STRUCTURES`
     names : of the n coordinates: a gain, or a gain and its degree of freedom
     low, high : (n,) bounds of the logarithms
-    basis : gain -> () 1.0, (6,) or (6, 6): what its coordinate multiplies; of `diagonal` ones
+    basis : gain -> (k,), (k, 6) or (k, 6, 6): what its k coordinates multiply
     model : ControlModel of the vehicle
     fastest : rate that the velocity loop may have, 1/s
 
@@ -57,12 +57,8 @@ class GainSpace:
         """Gain -> (B,), (B, 6) or (B, 6, 6) in the units of the law, of points (B, n)."""
         values, found, at = np.exp(x), {}, 0
         for gain, basis in self.basis.items():
-            if self.structure == 'diagonal':
-                found[gain] = values[:, at : at + 6]
-                at += 6
-            else:
-                found[gain] = values[:, at].reshape(-1, *(1,) * basis.ndim) * basis
-                at += 1
+            found[gain] = np.tensordot(values[:, at : at + len(basis)], basis, 1)
+            at += len(basis)
         return found
 
     def rate_margin(self, x: np.ndarray) -> np.ndarray:
@@ -93,14 +89,14 @@ class GainSpace:
         """
         parts: list[float] = []
         for gain, basis in self.basis.items():
-            at = slice(len(parts), len(parts) + (6 if self.structure == 'diagonal' else 1))
+            at = slice(len(parts), len(parts) + len(basis))
             middle = (self.low[at] + self.high[at]) / 2
             diagonal = np.diagonal(matrix6(gains.get(gain, 0.0)))
             if not np.all(diagonal > 0):
                 parts += middle.tolist()
                 continue
-            per_axis = np.log(diagonal / np.diagonal(matrix6(basis)))
-            parts += per_axis.tolist() if len(middle) == 6 else [per_axis.mean()]
+            per_axis = np.log(diagonal / np.diagonal(matrix6(basis.sum(axis=0))))
+            parts += per_axis.tolist() if len(basis) == 6 else [per_axis.mean()]
         return np.clip(parts, self.low, self.high)
 
 
@@ -123,32 +119,28 @@ def make_space(
 
     """
     M = np.reshape(model.dynamics.M, (6, 6))
-    inertia = np.diagonal(M)
-    names, low, high, basis = [], [], [], {}
+    names, low, high = [], [], []
+    basis: dict[str, np.ndarray] = {}
     for gain, about in SHIPPED[law].search(step).items():
-        matrix, smallest, largest = _scale(structure, M, inertial=about.inertial)
-        basis[gain] = matrix
-        if structure == 'diagonal':
-            size = inertia if about.inertial else np.ones(6)
-            names += [f'{gain}.{dof}' for dof in DOFS]
-            low += np.log(about.low * size).tolist()
-            high += np.log(about.high * size).tolist()
-        else:
-            names.append(gain)
-            low.append(np.log(about.low * smallest))
-            high.append(np.log(about.high * largest))
+        basis[gain], smallest, largest = _scale(structure, M, inertial=about.inertial)
+        names += [f'{gain}.{dof}' for dof in DOFS] if len(smallest) == 6 else [gain]
+        low += np.log(about.low * smallest).tolist()
+        high += np.log(about.high * largest).tolist()
     return GainSpace(
         law, structure, tuple(names), np.array(low), np.array(high), basis, model, fastest
     )
 
 
-def _scale(structure: str, M: np.ndarray, *, inertial: bool) -> tuple[np.ndarray, float, float]:
-    """Matrix that a coordinate scales, and the factor of its bounds."""
-    inertia, one = np.diagonal(M), np.array(1.0)
+def _scale(structure: str, M: np.ndarray, *, inertial: bool) -> tuple[np.ndarray, ...]:
+    """What k coordinates of a gain multiply, and the factors (k,) of their bounds."""
+    inertia, one = np.diagonal(M), np.ones(1)
+    if structure == 'diagonal':
+        size = inertia if inertial else np.ones(6)
+        return np.eye(6), size, size
     if inertial and structure == 'scalar':
-        return one, float(inertia.min()), float(inertia.max())
-    multiplied = {'mass': inertia.copy(), 'inertia': M.copy()} if inertial else {}
-    return multiplied.get(structure, one), 1.0, 1.0
+        return one, inertia.min(keepdims=True), inertia.max(keepdims=True)
+    multiplied = {'mass': inertia[None], 'inertia': M[None]} if inertial else {}
+    return multiplied.get(structure, one), one, one
 
 
 def starts_of(space: GainSpace, scenario: Scenario, reference: str) -> list[np.ndarray]:

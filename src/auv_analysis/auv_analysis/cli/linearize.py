@@ -56,9 +56,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     left_out: list[str] = []
     if isinstance(subject, Scenario):
         left_out = subject.sampled
-        names = list(dict.fromkeys(options.controller or subject.controllers))
-        for name in names:
-            subject.controller(name)
+        asked = dict.fromkeys(options.controller or subject.controllers)
+        names = [name for name in asked if subject.controller(name)['law'] != OPEN_LOOP]
     else:
         expected, found = 'a scenario, which has controllers', f'{paths[0]}, a vehicle'
         refuse_given(options, ('controller', 'delay', 'delay_from', 'lag'), expected, found)
@@ -74,7 +73,6 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
                 loops = {
                     name: ControlLoop(subject, name, delay, options.lag, options.nu0, eta0)
                     for name in names
-                    if subject.controller(name)['law'] != OPEN_LOOP
                 }
             margins = {name: stability_margins(loop) for name, loop in loops.items()}
     except ValueError as error:

@@ -4,9 +4,10 @@ import json
 
 import numpy as np
 import pytest
+import yaml
 from numpy.testing import assert_allclose
 
-from auv_analysis import linearize
+from auv_analysis import linearize, load_scenario
 from auv_analysis.cli.main import main
 from auv_analysis.studies.linearize.modes import stability
 
@@ -82,3 +83,15 @@ def test_refusals_are_one_line(line, name, tmp_path, monkeypatch, capsys):
     assert name in captured.err
     assert 'expected' in captured.err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_a_controller_without_feedback_has_no_closed_loop(tmp_path, capsys):
+    """What `auv excite` writes: its wrench holds no velocity, and the vehicle alone is left."""
+    data = load_scenario('case1_bluerov2_heavy').data | {
+        'vehicle': 'bluerov2_heavy', 'controllers': {'wave': {'law': 'multisine'}},
+        'excitation': {'surge': {'terms': [{'amplitude': 5.0, 'omega': 1.0, 'phase': 1.0}]}},
+    }  # fmt: skip
+    (tmp_path / 'wave.yaml').write_text(yaml.safe_dump(data))
+    main(['linearize', str(tmp_path / 'wave.yaml'), '--out', str(tmp_path / 'out'), '--json'])
+    assert list(json.loads(capsys.readouterr().out)['models']) == ['open loop']

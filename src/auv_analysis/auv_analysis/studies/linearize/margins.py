@@ -22,7 +22,7 @@ from auv_analysis.studies.linearize.linearize import (
 from auv_analysis.studies.linearize.sampled_loop import (
     HeldInput,
     HeldPlant,
-    SampledLaw,
+    LinearLaw,
     SampledLoop,
     behind_rotors,
 )
@@ -246,11 +246,6 @@ class ControlLoop:
         given = self.scenario.gain_values(self.controller)
         return next((name for name in ('k_P', 'k_D') if name in given), '')
 
-    @property
-    def values(self) -> np.ndarray:
-        """(6,) diagonal of that gain."""
-        return np.diagonal(matrix6(self.scenario.gain_values(self.controller)[self.gain])).copy()
-
     def _law(self, scale: np.ndarray) -> LawAt:
         values = self.scenario.gain_values(self.controller)
         if self.gain:
@@ -267,7 +262,8 @@ class ControlLoop:
         law = self._law(np.asarray(scale, float))
         held = holding_point(law, self._truth, *self._point)
         slope, _ = law.jacobian(held, 8 + law.states)
-        return SampledLoop(self.plant, SampledLaw.of(slope), self._held)
+        parts = LinearLaw(slope[:6, :8], slope[:6, 8:], slope[6:, :8], slope[6:, 8:])
+        return SampledLoop(self.plant, parts, self._held)
 
     def sensitivity(self, loop: SampledLoop) -> tuple[np.ndarray, np.ndarray]:
         """(n,) rad/s and S (n, 6, 6) there: on the grid, and around resonances."""
@@ -416,7 +412,8 @@ def _row(setting: ControlLoop, axis: int, found: AxisMargins | None) -> dict[str
             'crossover': known(found.crossover),
         }
     if setting.gain:
-        value = float(setting.values[axis])
+        given = setting.scenario.gain_values(setting.controller)[setting.gain]
+        value = float(matrix6(given)[axis, axis])
         row |= {'value': value, 'largest': known(value * setting.largest(axis))}
     return row
 
@@ -483,14 +480,13 @@ def _note(settings: Sequence[ControlLoop]) -> str:
         if not stable(loop):
             return f'warning: {path}: unstable {late}; see auv linearize'
         rows += enumerate(setting.margins(loop, delays=False))
-    gain = min(rows, key=lambda row: min(row[1].gain, 1 / max(row[1].reduction, MEASURABLE)))
-    phase = min(rows, key=lambda row: row[1].phase)
-    factor = min(gain[1].gain, 1 / max(gain[1].reduction, MEASURABLE))
-    by_gain = f'{20 * np.log10(factor):.3g} dB ({DOFS[gain[0]]})'
-    by_phase = f'{np.degrees(phase[1].phase):.3g} deg ({DOFS[phase[0]]})'
+    factor, axis = min((min(m.gain, 1 / max(m.reduction, MEASURABLE)), i) for i, m in rows)
+    by_gain = f'{20 * np.log10(factor):.3g} dB ({DOFS[axis]})'
+    phase, axis = min((m.phase, i) for i, m in rows)
+    by_phase = f'{np.degrees(phase):.3g} deg ({DOFS[axis]})'
     text = (
         f'{path}: gain margin {by_gain if factor < 1 / MEASURABLE else "without end"}, '
-        f'phase margin {by_phase if np.isfinite(phase[1].phase) else "without end"} {late}'
+        f'phase margin {by_phase if np.isfinite(phase) else "without end"} {late}'
     )
     if all(one.kept for _, one in rows):
         return f'note: {text}'

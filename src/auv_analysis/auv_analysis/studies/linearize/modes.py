@@ -127,13 +127,11 @@ POLES: dict[str, Shown] = {
     'part': described('part', decimals=0, scale=100.0),
 }
 
-
-DECIBEL: dict[str, Any] = {'decimals': 1}
 MARGINS: dict[str, Shown] = {
     'controller': 'controller',
     'axis': 'axis',
-    'gain_margin_db': described('gain', unit='dB', **DECIBEL),
-    'phase_margin': described('phase', unit='deg', **DECIBEL),
+    'gain_margin_db': described('gain', unit='dB', decimals=1),
+    'phase_margin': described('phase', unit='deg', decimals=1),
     'delay_margin': described('delay', unit='s', **FOUR),
     'crossover': described('crossover', unit='rad/s', **FOUR),
     'value': described('velocity gain', **FOUR),

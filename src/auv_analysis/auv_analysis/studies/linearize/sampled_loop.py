@@ -126,7 +126,7 @@ class HeldPlant:
 WHOLE = 1e-9  # of a period: a delay nearer than this to a whole number of them is that number
 
 
-class SampledLaw(NamedTuple):
+class LinearLaw(NamedTuple):
     """tau_k = by_x x_k + by_state s_k, s_{k+1} = s_k + h (rate_by_x x_k + rate_by_state s_k).
 
     Attributes
@@ -140,11 +140,6 @@ class SampledLaw(NamedTuple):
     by_state: np.ndarray
     rate_by_x: np.ndarray
     rate_by_state: np.ndarray
-
-    @classmethod
-    def of(cls, slope: np.ndarray) -> 'SampledLaw':
-        """Law with these derivatives (6 + m, 8 + m), see `LawAt.jacobian`."""
-        return cls(slope[:6, :8], slope[:6, 8:], slope[6:, :8], slope[6:, 8:])
 
     def response(self, z: np.ndarray, period: float) -> np.ndarray:
         """(..., 6, 8) from what the law sees to tau."""
@@ -165,28 +160,24 @@ class SampledLoop:
     """
 
     plant: HeldPlant
-    law: SampledLaw
+    law: LinearLaw
     held: HeldInput
 
     def z(self, omega: np.ndarray) -> np.ndarray:
         """exp(i omega h) at rad/s."""
         return np.exp(1j * np.asarray(omega) * self.plant.period)
 
-    def gain(self, omega: np.ndarray, plant: np.ndarray | None = None) -> np.ndarray:
-        """Loop gain L (..., 6, 6) at omega (...,) rad/s; tau = -L u where the loop is open.
+    def sensitivity(self, omega: np.ndarray, plant: np.ndarray | None = None) -> np.ndarray:
+        """S = (I + L)^-1 (..., 6, 6) at omega (...,) rad/s; tau = -L u where the loop is open.
 
-        `plant` is the plant's response there where it is known.
+        `plant` is the plant's response there where it is known. With the loop opened at axis i
+        alone, the others closed, its gain is 1/S_ii - 1.
+
+        Skogestad & Postlethwaite 2005, section 2.2.
         """
         z = self.z(omega)
         seen = self.plant.response(z, self.held) if plant is None else plant
-        return -self.law.response(z, self.plant.period) @ seen
-
-    def sensitivity(self, omega: np.ndarray, plant: np.ndarray | None = None) -> np.ndarray:
-        """S = (I + L)^-1 (..., 6, 6), Skogestad & Postlethwaite 2005, section 2.2.
-
-        With the loop opened at axis i alone, the others closed, its gain is 1/S_ii - 1.
-        """
-        return np.linalg.inv(np.eye(6) + self.gain(omega, plant))
+        return np.linalg.inv(np.eye(6) - self.law.response(z, self.plant.period) @ seen)
 
     def closing(self, omega: float, axis: int, extra: float) -> complex:
         """1 + the loop gain of an axis whose wrench comes `extra` s later still."""
@@ -200,11 +191,10 @@ class SampledLoop:
 
     @cached_property
     def multipliers(self) -> np.ndarray:
-        """Eigenvalues of the transition over a period, in modulus at most 1 where it is stable."""
-        return np.linalg.eigvals(self.transition())
+        """Eigenvalues of the transition over a period, in modulus at most 1 where it is stable.
 
-    def transition(self) -> np.ndarray:
-        """Transition matrix of the closed loop over a period: x, the law's state, past wrenches."""
+        The transition is that of x, the law's state and past wrenches.
+        """
         held, law, h = self.held, self.law, self.plant.period
         n, m = len(self.plant.A), len(law.rate_by_x)
         past = held.whole + bool(held.older.any())
@@ -222,4 +212,4 @@ class SampledLoop:
         if past:
             A[n + m : n + m + 6, : n + m] = command
             A[n + m + 6 :, n + m : -6] = np.eye(6 * (past - 1))
-        return A
+        return np.linalg.eigvals(A)

@@ -121,13 +121,13 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         profile=[name.strip() for name in options.profile.split(',')] if options.profile else (),
     )  # fmt: skip
     trial = read(options, 'identify')
-    vehicle = trial.vehicle
+    vehicle, data = trial.vehicle, read_yaml(trial.inputs[-1], 'vehicle')
     with results_folder(trial.out, overwrite=options.overwrite, inputs=trial.inputs) as folder:
         found = identify(trial.training, trial.held, vehicle, settings, lambda t: say(f'  {t}'))
         results = results_of(found, trial.notes, accepted=options.accept)
         if results.facts['file']:
-            data = read_yaml(trial.inputs[-1], 'vehicle')
-            source = f'identified from {", ".join(bag.name for bag in options.bags)}; prior: '
+            names = dict.fromkeys(record.name for record in trial.training)
+            source = f'identified from {", ".join(names)}; prior: '
             source += str(data.get('source') or vehicle.name)
             name = f'{vehicle.name}_identified'
             text = vehicle_text(found, data, name, source)

@@ -167,15 +167,17 @@ def test_a_prediction_is_one_document_where_it_is_asked_for(short, tmp_path, mon
 
 @pytest.mark.usefixtures('undrawn')
 def test_a_recording_that_contradicts_the_prior_gives_no_file(bag, tmp_path, monkeypatch, capsys):
-    out, found = tmp_path / 'other', []
+    out, found, prior = tmp_path / 'other', [], tmp_path / 'prior.yaml'
+    prior.write_bytes(shipped('vehicles', 'rexrov').read_bytes())
 
     def once(*given, work=identify.identify):
         found.append(found[0] if found else work(*given))
+        prior.write_text('edited meanwhile')
         return found[0]
 
     monkeypatch.setattr(identify, 'identify', once)
-    fewer = ('--part', '0:10', '--free', 'M.diagonal', '--free', 'D_linear')
-    given = ('identify', bag, '--vehicle', 'rexrov', '--out', out, *fewer)
+    fewer = ('--part', '0:5', '--part', '5:10', '--free', 'M.diagonal', '--free', 'D_linear')
+    given = ('identify', bag, '--vehicle', prior, '--out', out, *fewer)
     with pytest.raises(SystemExit) as end:
         main([*map(str, given), '--json'])
     said = capsys.readouterr()
@@ -184,7 +186,10 @@ def test_a_recording_that_contradicts_the_prior_gives_no_file(bag, tmp_path, mon
     assert '  least squares\n' in said.err, 'how far it is'
     assert json.loads(said.out) == json.loads((out / 'identify.json').read_text())
     assert not (out / 'vehicle.yaml').exists()
-    assert 'No vehicle file: ' in (out / 'report.html').read_text(encoding='utf-8')
+    page = (out / 'report.html').read_text(encoding='utf-8')
+    assert 'No vehicle file: ' in page
+    assert f'>from {bag.name}<' in page, 'once, whatever its stretches'
+    prior.write_bytes(shipped('vehicles', 'rexrov').read_bytes())
     code, said = auv(capsys, *given, '--accept', '--overwrite', '--no-report')
     assert (code, len(found)) == (0, 2), said
     assert (out / 'vehicle.yaml').exists()
@@ -238,7 +243,7 @@ def test_the_wrench_that_acted_takes_the_place_of_the_command_and_the_truth_that
         )
 
 
-def test_a_reset_cuts_a_bag_and_is_told(tmp_path, capsys):
+def test_a_reset_cuts_a_bag_and_is_told(tmp_path, monkeypatch, capsys):
     _, run = sea_trials.trial(tmp_path, 'herman2018', 5, duration=3.0)
     seen = motion(run, enu=False)
     late = seen._replace(twist=seen.twist + np.outer(run.t > 1.51, [0.3, 0, 0, 0, 0, 0]))
@@ -248,6 +253,9 @@ def test_a_reset_cuts_a_bag_and_is_told(tmp_path, capsys):
     assert [(one.start, one.end) for one in records] == [(0.0, 1.5), pytest.approx((1.52, 3.0))]
     assert notes[-1] == 'the velocity jumps at 1.52 s, as by a reset: cut there'
     assert capsys.readouterr().err == f'warning: {bag}: {notes[-1]}\n'
+    monkeypatch.chdir(bag)
+    here = read_records(Path(), load_vehicle('herman2018'), None, applied=False, notes=[])
+    assert {one.name for one in (*records, *here)} == {'bag'}, 'also where it is `.`'
 
 
 def test_a_vehicle_that_no_command_takes_gives_no_file(tmp_path):

@@ -23,7 +23,6 @@ from auv_dynamics.ros.interface import GROUND_TRUTH, ODOM, WRENCH, WRENCH_APPLIE
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle
 
-OURS = {'odometry': ODOM, 'wrench': WRENCH}
 USUAL = 0.95  # quantile of a wrench that single peaks do not move
 CLIPPED = 1.5  # times what acts: more than a lag takes away
 NOTHING = 1e-3  # of the largest command of its kind
@@ -69,7 +68,7 @@ def read_records(
     for note in warnings:
         say(f'warning: {bag}: {note}')
     notes += [*contradictions(tracks, otherwise, mapping), *warnings]
-    records = of_tracks(bag.name, tracks, role)
+    records = of_tracks(bag.absolute().name, tracks, role)
     if not any(record.known.any() for record in records):
         found = 'a velocity that never changes' if records else 'none'
         raise InputError(bag, '', 'a second and more with attitude, velocity and wrench', found)
@@ -101,7 +100,7 @@ def without_constants(twist: Track, notes: list[str]) -> Track:
 def _ours(bag: Path, *, applied: bool) -> TopicMap:
     topics = survey(bag).types
     found = {}
-    for role, name in {**OURS, WRENCH_APPLIED: WRENCH_APPLIED}.items():
+    for role, name in (('odometry', ODOM), (WRENCH, WRENCH), (WRENCH_APPLIED, WRENCH_APPLIED)):
         some = [topic for topic in topics if topic.rpartition('/')[2] == name
                 and not topic.endswith(GROUND_TRUTH)]  # fmt: skip
         if role == WRENCH_APPLIED and not applied and len(some) != 1:

@@ -360,6 +360,6 @@ def write_report(found: Identified, results: Results, out: Path) -> Path:
         Section('method', 'How it was found', [*METHOD, *_asked(found), *facts['notes']]),
     ]  # fmt: skip
     listings = [(VEHICLE, (out / VEHICLE).read_text('utf-8'))] if (out / VEHICLE).exists() else []
-    names = join([record['name'] for record in facts['records']])
+    names = join([*dict.fromkeys(record['name'] for record in facts['records'])])
     title = f'Identification of {facts["vehicle"]}'
     return write_document(out, title, f'from {names}', told, sections, listings)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.cli.arguments import VEHICLE, add_no_report, add_results, number, whole
+from auv_analysis.studies.excite import SPEED
 
 DEPTH = 10.0  # m
 
@@ -29,7 +30,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     text = 'largest wrench, 1 or 6 numbers, N and N m; 0: an axis that is not driven; default: a '
     text += 'third of what the thrusters give, else what moves the vehicle at the speed'
     command.add_argument('--limit', type=number(at_least=0.0), nargs='+', metavar='N', help=text)
-    text = 'largest speed, m/s; default: 0.5, or more where vehicles near the file drift as '
+    text = f'largest speed, m/s; default: {SPEED:g}, or more where vehicles near the file drift as '
     text += 'fast'
     command.add_argument('--speed', type=positive, metavar='M/S', help=text)
     text = 'largest angular rate, rad/s; default: twice the number of the speed, or more where '

@@ -51,8 +51,9 @@ VEHICLE = 'bluerov2_heavy'
 
 def request_of(vehicle: str = VEHICLE, room: tuple[float, ...] = TANK, **changes) -> Request:
     wrench = np.array([15.0, 15.0, 15.0, 2.0, 2.0, 2.0])
-    bounds = Bounds(wrench, 0.5, 1.0, 0.8, np.array(room))
-    return replace(Request(vehicle, bounds, 40.0, 0.05), **changes)
+    bounds = Bounds(wrench, 0.5, 1.0, np.array(room))
+    usual = DEFAULT, (), 0.1, 0.005, 0.003, 0.1, False, 0
+    return replace(Request(vehicle, bounds, 40.0, 0.05, *usual), **changes)
 
 
 @pytest.fixture(autouse=True, scope='module')
@@ -312,7 +313,7 @@ def test_a_motion_that_is_not_finite_gains_nothing(excited) -> None:
 
 
 def test_shares_of_the_bounds_by_hand() -> None:
-    bounds = Bounds(np.array([10.0, 20.0, 0.0, 4.0, 5.0, 8.0]), 0.5, 2.0, 0.8,
+    bounds = Bounds(np.array([10.0, 20.0, 0.0, 4.0, 5.0, 8.0]), 0.5, 2.0,
                     np.array([4.0, 10.0, np.inf]))  # fmt: skip
     states = np.zeros((2, 1, 3, 13))
     states[..., 3] = 1.0
@@ -574,7 +575,7 @@ def test_the_closed_loop_of_a_small_vehicle_keeps_its_wrench(tmp_path: Path) -> 
 def test_a_vehicle_that_sinks_must_close_its_loop(monkeypatch) -> None:
     for name in ('PHASES', 'STARTS'):
         monkeypatch.setattr(searching, name, 2)
-    bounds = Bounds(np.array([500.0, 500.0, 1500.0, 150.0, 600.0, 200.0]), 0.4, 0.8, 0.8,
+    bounds = Bounds(np.array([500.0, 500.0, 1500.0, 150.0, 600.0, 200.0]), 0.4, 0.8,
                     np.array([np.inf, np.inf, 10.0]))  # fmt: skip
     heavy = request_of('herman2018', duration=20.0, step=0.1, bounds=bounds)
     with pytest.raises(FailedError, match=r'the open loop leaves its bounds: .* --closed-loop'):

@@ -13,7 +13,7 @@ from auv_analysis.scenario.scaling import plain_name, scaled_gains
 from auv_analysis.scenario.scenario import Scenario, resolved, scenario_from
 from auv_analysis.simulation.open_loop import open_loop
 from auv_analysis.simulation.simulate import DivergedError, simulate
-from auv_analysis.studies.identify.unknowns import DEFAULT
+from auv_analysis.studies.excite import SPEED
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import read_yaml
 from auv_dynamics.plant.disturbance import Harmonics
@@ -33,8 +33,7 @@ LEAST = 0.02  # of the largest wrench or set-point: the smallest that is tried
 STEEPEST = 1.5  # exponent of the frequency, by which amplitudes may fall or rise
 BEYOND = 1e6  # share of a bound that stands for a motion that is not finite
 LOOK = 0.05  # s, from a state that shows how far a motion goes to the next, while searching
-TILT = 0.8  # rad
-SPEED = 0.5  # m/s
+TILT = 0.8  # rad between the vertical of the body and that of the world, at most
 SHARE = 1 / 3  # of what the thrusters give on one axis alone, as all are driven at once
 WORDS = ('wrench', 'speed', 'angular rate', 'tilt', 'room')
 LONGEST = 80  # of the vehicle's name in that of the scenario
@@ -47,7 +46,7 @@ class Bounds:
     Attributes
     ----------
     wrench : (6,) N and N m; 0: an axis without actuators
-    speed, rate, tilt : m/s, rad/s, and rad between the body's vertical and the world's
+    speed, rate : m/s and rad/s
     room : (3,) m that there are in all along north, east and down, the start in their middle
 
     """
@@ -55,7 +54,6 @@ class Bounds:
     wrench: np.ndarray
     speed: float
     rate: float
-    tilt: float
     room: np.ndarray
 
     def used(self, motion: 'Motion') -> np.ndarray:
@@ -70,7 +68,7 @@ class Bounds:
             (np.abs(motion.commands).max(axis=2) / limit).max(axis=-1),
             np.sqrt(speed) / self.speed,
             np.sqrt(rate) / self.rate,
-            np.arccos(np.clip(1.0 - 2.0 * tilted, -1.0, 1.0)) / self.tilt,
+            np.arccos(np.clip(1.0 - 2.0 * tilted, -1.0, 1.0)) / TILT,
             (2.0 * np.abs(x[..., :3]).max(axis=2) / self.room).max(axis=-1),
         )
         used = np.stack(np.broadcast_arrays(*shares), axis=-1)
@@ -102,7 +100,7 @@ def bounds_of(
         turning = np.abs(vehicle.g(tilted) - still)
         wrench = np.diag(vehicle.M) * nu + np.abs(np.diag(vehicle.D(nu)) * nu)
         wrench = wrench + turning + np.abs(still)
-    return Bounds(wrench, speed, rate, TILT, room)
+    return Bounds(wrench, speed, rate, room)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,14 +126,14 @@ class Request:
     bounds: Bounds
     duration: float
     step: float
-    free: Sequence[str] = DEFAULT
-    fixed: Sequence[str] = ()
-    lag: float = 0.1
-    velocity_noise: float = 0.005
-    attitude_noise: float = 0.003
-    spread: float = 0.1
-    closed: bool = False
-    seed: int = 0
+    free: Sequence[str]
+    fixed: Sequence[str]
+    lag: float
+    velocity_noise: float
+    attitude_noise: float
+    spread: float
+    closed: bool
+    seed: int
 
     @cached_property
     def path(self) -> Path:

@@ -69,17 +69,13 @@ def _intervals(rows: Sequence[Mapping[str, Any]]) -> Drawn:
 def _wrench(found: Excited) -> Drawn:
     """Wrench and velocity over time."""
     panels = []
-    for name, signals in (
-        ('tau', found.motion.commands[0, 0]),
-        ('nu', found.motion.states[0, 0, :, 7:]),
-    ):
-        t = found.request.step * np.arange(len(signals))
-        for i, dof in enumerate(DOFS):
-            curve = Curve(t, signals[:, i], '',
-                          {'color': COLOURS[int(name == 'nu')], 'linewidth': 0.9})  # fmt: skip
+    signals = {'tau': found.motion.commands[0, 0], 'nu': found.motion.states[0, 0, :, 7:]}
+    for i, dof in enumerate(DOFS):
+        for (name, rows), colour in zip(signals.items(), COLOURS, strict=False):
+            t = found.request.step * np.arange(len(rows))
+            curve = Curve(t, rows[:, i], '', {'color': colour, 'linewidth': 0.9})
             panels.append(Panel([curve], SIGNALS[name].unit_of(i), dof))
-    ordered = [panel for pair in zip(panels[:6], panels[6:], strict=True) for panel in pair]
-    figure = time_panels(ordered, across=2, height=1.2)
+    figure = time_panels(panels, across=2, height=1.2)
     caption = 'Wrench (left) and velocity (right) of the vehicle of the file.'
     return figure, 'Wrench and velocity', caption
 

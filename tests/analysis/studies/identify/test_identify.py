@@ -382,13 +382,33 @@ def test_starts_that_a_diverging_model_cannot_tell_apart_are_no_error():
     assert_allclose(back[1][:, :3], of_second, rtol=1e-9)
 
 
-def test_damping_of_a_vehicle_that_gains_speed_is_held_where_it_takes_energy():
-    """Yaw grows by itself: its damping is held at zero, and lauv's couplings with sway too."""
-    t, vehicle, still = np.arange(0.0, 10.0, 0.05), load_vehicle('lauv'), np.zeros((200, 6))
+def growing() -> Record:
+    """Yaw grows by itself."""
+    t, still = np.arange(0.0, 10.0, 0.05), np.zeros((200, 6))
     nu, eta = still.copy(), still.copy()
     nu[:, 5] = 0.02 * np.exp(0.2 * t)
     eta[:, 5] = nu[:, 5] / 0.2
-    record = Record('growing', t, quaternion(eta[:, 3:]), t, nu, 0.05, still, 0.0)
+    return Record('growing', t, quaternion(eta[:, 3:]), t, nu, 0.05, still, 0.0)
+
+
+def test_a_model_of_which_damping_held_at_zero_is_all_that_was_free_has_its_rows_and_draws():
+    vehicle = load_vehicle('lauv')
+    u = unknowns(vehicle, ('D_linear.yaw',), speeds=np.full(6, 0.1), wrenches=np.ones(6))
+    problem = OutputError(vehicle, segments_of(growing(), 2.0, 0.6), 0.05, np.full(9, 0.003))
+    fit = problem.fit(u, np.zeros(1), most=10)
+    after, zeros = _dissipative(problem, fit, problem.covariance(fit))
+    assert after.unknowns.entries == ()
+    found = Identified(vehicle, [], held_of([], 0.6), problem, after, problem.covariance(after), [],
+                       zeros, ())  # fmt: skip
+    rows = found.coefficients()
+    assert [row['name'] for row in rows] == [entry.name for entry in zeros]
+    assert {row['status'] for row in rows} == {'at zero'}
+    assert (found.combinations(), found.draws(3).M.shape) == ([], (3, 6, 6))
+
+
+def test_damping_of_a_vehicle_that_gains_speed_is_held_where_it_takes_energy():
+    """Its yaw damping is held at zero, and lauv's couplings with sway too."""
+    vehicle, record = load_vehicle('lauv'), growing()
     u = unknowns(vehicle, ('D_linear',), speeds=np.full(6, 0.1), wrenches=np.ones(6))
     problem = OutputError(vehicle, segments_of(record, 2.0, 0.6), 0.05, np.full(9, 0.003))
     fit = problem.fit(u, np.zeros(6), most=10)

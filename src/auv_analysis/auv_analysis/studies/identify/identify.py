@@ -425,22 +425,19 @@ def _dissipative(
 
     """
     half = fit.quantile * np.sqrt(np.diag(covariance))
-    found = fit.unknowns.coefficients(fit.theta)
-    changed: dict[str, np.ndarray] = {}
-    zeros: dict[Entry, float | None] = {}
-    for k, entry in enumerate(fit.unknowns.entries):
-        if entry.group.startswith('D_') and len(set(entry.index)) == 1:
-            matrix = getattr(found, entry.group)
-            if matrix[entry.index] < 0.0:
-                high = float(matrix[entry.index] + half[k] * entry.unit)
-                zeros[entry] = max(high, 0.0)
-    pair = () if zeros else feeding(found.D_linear)
+    values, entries = fit.unknowns.values(fit.theta), fit.unknowns.entries
+    zeros: dict[Entry, float | None] = {
+        entry: max(float(values[k] + half[k] * entry.unit), 0.0) for k, entry in enumerate(entries)
+        if entry.group.startswith('D_') and len(set(entry.index)) == 1 and values[k] < 0.0
+    }  # fmt: skip
+    pair = () if zeros else feeding(fit.unknowns.coefficients(fit.theta).D_linear)
     if pair:
         one = np.ones(6)
         every = unknowns(problem.vehicle, ('D_linear.full',), speeds=one, wrenches=one).entries
         zeros = dict.fromkeys(e for e in every if set(e.index) == set(pair))
     if not zeros:
         return fit, {}
+    changed: dict[str, np.ndarray] = {}
     for entry in zeros:
         held = changed.setdefault(entry.group, getattr(fit.unknowns.prior, entry.group).copy())
         held[entry.index] = 0.0

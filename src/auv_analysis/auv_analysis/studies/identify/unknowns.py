@@ -141,8 +141,10 @@ class Unknowns:
 
     def values(self, theta: np.ndarray) -> np.ndarray:
         """Free coefficients (..., n) in their own units."""
-        found = self.coefficients(theta)
-        return np.stack([getattr(found, e.group)[(..., *e.index)] for e in self.entries], axis=-1)
+        found, free = self.coefficients(theta), np.array(theta, float)
+        for k, entry in enumerate(self.entries):
+            free[..., k] = getattr(found, entry.group)[(..., *entry.index)]
+        return free
 
     def gradient(self, theta: np.ndarray) -> np.ndarray:
         """Derivatives (n, n) of `values` by theta, by central steps."""

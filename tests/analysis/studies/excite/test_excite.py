@@ -692,3 +692,28 @@ def test_axes_that_may_not_be_driven_are_not(closed: bool) -> None:
     assert ('lag' in names) != closed, 'what acts has none'
     found = SimpleNamespace(request=request, scenario={})
     assert ('then auv identify --applied.' in scenario_text(found)) == closed
+
+
+@pytest.mark.parametrize(('asked', 'needed', 'expected'), [
+    ((None, None), (0.0, 0.0), (0.5, 1.0)), ((None, None), (0.7, 0.2), (0.7, 1.4)),
+    ((None, None), (0.2, 3.0), (0.5, 3.0)), ((0.3, None), (0.7, 0.2), (0.3, 0.6)),
+    ((None, 0.4), (0.7, 3.0), (0.7, 0.4)),
+])  # fmt: skip
+def test_usual_speeds_are_what_vehicles_need_and_those_that_are_asked_for_stay(
+    asked, needed, expected
+) -> None:
+    wrench, room = np.arange(6.0), np.full(3, np.inf)
+    bounds = bounds_of(load_vehicle(VEHICLE), room, wrench, *asked, *needed)
+    assert (bounds.speed, bounds.rate) == pytest.approx(expected)
+    assert bounds.wrench is wrench
+
+
+@pytest.mark.parametrize(
+    ('fastest', 'step'), [(19.9, 0.05), (20.1, 0.02), (49.9, 0.02), (199.0, 0.005), (1e6, 0.005)]
+)
+def test_a_step_is_shorter_than_damping_at_the_largest_speed_takes(fastest, step) -> None:
+    """Damping goes with the speed, 0.4 m/s, and with the rate, 0.8 rad/s; one axis is fastest."""
+    M, damped = np.diag(np.arange(1.0, 7.0)), np.array([1.0, 1.0, 1.0, 1.0, fastest / 0.8, 1.0])
+    vehicle = SimpleNamespace(M=M, D=lambda nu: M @ np.diag(damped * np.abs(nu)))
+    bounds = Bounds(np.ones(6), 0.4, 0.8, np.full(3, np.inf))
+    assert searching.usual_step(vehicle, bounds) == step

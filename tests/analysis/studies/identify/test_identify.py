@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 
 from auv_analysis.bag.tracks import Track
 from auv_analysis.studies.identify import plausibility
-from auv_analysis.studies.identify.couplings import couplings
+from auv_analysis.studies.identify.couplings import _excludes_zero, _told, couplings
 from auv_analysis.studies.identify.identified import Identified
 from auv_analysis.studies.identify.identify import (
     Settings,
@@ -36,7 +36,7 @@ from auv_analysis.studies.identify.plausibility import (
 from auv_analysis.studies.identify.prediction import held_of
 from auv_analysis.studies.identify.record import Record, of_tracks, segments_of
 from auv_analysis.studies.identify.unknowns import unknowns
-from auv_analysis.studies.identify.vehicle_text import vehicle_text
+from auv_analysis.studies.identify.vehicle_text import vehicle_text, with_vehicle
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.vehicle import DOFS
@@ -473,3 +473,29 @@ def test_a_recording_is_split_at_pauses():
     }
     first, last = of_tracks('x', tracks)  # 0.4 s are no pause
     assert_allclose([first.start, first.end, last.start, last.end], [0.0, 3.9, 5.1, 9.9])
+
+
+def test_a_vehicle_with_what_was_identified_has_its_weight_and_moments():
+    """Mass and centre of gravity stay: what the restoring forces tell is where the buoyancy is."""
+    vehicle = load_vehicle('herman2018')
+    told = {'M': 1.1 * vehicle.M, 'D_linear': 1.2 * vehicle.D_linear,
+            'D_quadratic': 1.3 * vehicle.D_quadratic}  # fmt: skip
+    found = SimpleNamespace(**told, hydrostatics=np.array([-50.0, 10.0, -20.0, 300.0]))
+    new = with_vehicle(vehicle, found)
+    assert_allclose(new.model.hydrostatics, found.hydrostatics, rtol=1e-9)
+    assert (new.weight, new.r_G.tolist()) == (vehicle.weight, vehicle.r_G.tolist())
+    for name, matrix in told.items():
+        assert_allclose(getattr(new, name), matrix)
+
+
+def test_an_interval_is_that_of_the_draws_and_begins_at_zero_where_nothing_is_certain():
+    values = np.array([7.0, 8.0, *np.linspace(1.0, 5.0, 401)])
+    expected = {'share_prior': 7.0, 'share': 8.0, 'share_low': 1.1, 'share_high': 4.9}
+    assert _told('share', values) == pytest.approx(expected)
+    assert _told('share', values, certain=False) == pytest.approx({**expected, 'share_low': 0.0})
+    draws = np.tile(np.eye(6), (401, 1, 1))
+    for row, middle in enumerate((1.0, 0.9, -1.0)):  # of which 0, 5 and 0 % lie beyond zero
+        draws[:, row, 5] = np.linspace(-1.0, 1.0, 401) + middle
+    found = _excludes_zero(draws)
+    assert found[:3, 5].tolist() == [True, False, True]
+    assert found.sum() == 2, 'the diagonal counts not'

@@ -46,7 +46,7 @@ from auv_analysis.studies.identify.record import (
     smoothed,
 )
 from auv_analysis.studies.identify.residuals import FARTHEST, fill_residuals
-from auv_analysis.studies.identify.start import least_squares_start
+from auv_analysis.studies.identify.start import _definite, least_squares_start
 from auv_analysis.studies.identify.unknowns import unknowns
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.shipped import shipped
@@ -720,3 +720,17 @@ def test_what_hardly_moves_is_not_searched():
     some.velocity[:, 1] *= 0.03 / some.evenly()[:, 1].std()  # three times its noise
     assert not _still([some], noise, u)
     assert not _still([some, lacking], noise, u), 'what was not measured did not stand still'
+
+
+def test_a_start_has_the_inertia_that_is_definite_and_nearest():
+    M = load_vehicle('herman2018').M
+    assert_allclose(_definite(M, M), M, rtol=1e-12, atol=1e-9)
+    prior, wrong = np.diag(np.arange(1.0, 7.0)), np.diag(np.arange(1.0, 7.0))
+    wrong[0, 0] = -3.0  # a twentieth of the prior takes its place
+    wrong[4, 2] = wrong[2, 4] = 2.0 * np.sqrt(5.0 * 3.0)  # twice what is possible
+    found = _definite(wrong, prior)
+    assert found[0, 0] == pytest.approx(0.05)
+    # of [[1, 2], [2, 1]] the eigenvalue -1 becomes 0.02
+    assert (found[2, 2], found[4, 4]) == pytest.approx((3.0 * 1.51, 5.0 * 1.51))
+    assert found[4, 2] == pytest.approx(1.49 * np.sqrt(5.0 * 3.0))
+    assert_allclose(np.diag(found)[[1, 3, 5]], [2.0, 4.0, 6.0])

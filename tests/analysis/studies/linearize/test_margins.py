@@ -539,6 +539,14 @@ def test_the_note_is_of_the_worse_of_rest_and_way(monkeypatch):
     assert margin_notes(scenario, ['gvc'])[0].endswith('controllers.gvc: no margins: lost')
 
 
+def test_the_way_is_at_the_mean_of_the_set_point():
+    """A whole period of a sine adds nothing to it."""
+    sine = {'amplitude': 2.0, 'omega': 2.0 * np.pi / 5.0, 'phase': 0.3}
+    setpoint = {'surge': {'offset': 0.5, 'terms': [sine]}, 'yaw': {'offset': -0.1}}
+    found = margins._mean_setpoint(scenario_of(setpoint=setpoint, duration=5.0))
+    assert_allclose(found, [0.5, 0.0, 0.0, 0.0, 0.0, -0.1], atol=2e-3)
+
+
 def test_what_is_odd_about_a_scenario_is_said(capsys):
     warn(SimpleNamespace(warnings=('file: key: odd', 'two'), path='x', data={}), [])
     assert capsys.readouterr().err.splitlines() == ['warning: file: key: odd', 'warning: two']

@@ -94,7 +94,8 @@ def test_the_bound_is_judged_by_the_largest_rate_of_the_whole_run():
         L_dot = np.array([0.0, excess]) - lost
         return Certificate(T[:2], *3 * [nothing], lost, L_dot, lost, 0.0 * lost, 0.0 * lost)
 
-    figures = as_figures(iter([block(0.0, 0.0), block(1.0, 2e-6), block(4.0, 8e-6)]), 0.0)
+    blocks = [block(0.0, 0.0), block(1.0, 2e-6), block(4.0, 8e-6)]
+    figures = as_figures(lambda: iter(blocks), 0.0)
     assert figures['share_bound_28'] == 5 / 6
     assert figures['share_condition_27'] == 1.0, 'also at rest'
     assert figures['identity_residual'] == pytest.approx(2e-6)

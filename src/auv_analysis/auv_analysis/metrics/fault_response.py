@@ -1,7 +1,7 @@
 """Response to faults: errors and effort before, during and after each."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,16 +119,22 @@ def _of(parts: Sequence[Part | None], name: str, column: int) -> tuple[Any, ...]
 def recovery_times(mark: Mark, run: Run, band: np.ndarray) -> list[float | None]:
     """Seconds from the end of a fault until each error has settled in its band; None: never."""
     tiny, until = 1e-6 * run.step, next_change(mark, run)
-    errors = []
-    for block in run.blocks():
-        behind = (block.t >= mark.end - tiny) & (block.t < until - tiny)
-        errors.append((block.t[behind], (block.nu_d - block.nu)[behind]))
-    t = np.concatenate([times for times, _ in errors])
-    if mark.end < run.start or not len(t):
+
+    def behind() -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        for block in run.blocks():
+            inside = (block.t >= mark.end - tiny) & (block.t < until - tiny)
+            if inside.any():
+                yield block.t[inside], (block.nu_d - block.nu)[inside]
+
+    counted = [(t[0], len(t)) for t, _ in behind()]
+    if mark.end < run.start or not counted:
         return [None] * 6
-    settled, _ = settling_times(errors, len(t), band)
-    since = [None if time is None else round(time - mark.end, 9) for time in settled]
-    return [0.0 if time == t[0] else wait for time, wait in zip(settled, since, strict=True)]
+    settled, _ = settling_times(behind(), sum(count for _, count in counted), band)
+    first = counted[0][0]
+    return [
+        None if time is None else 0.0 if time == first else round(time - mark.end, 9)
+        for time in settled
+    ]
 
 
 def fault_rows(found: Mapping[str, Sequence[FaultResponse]]) -> list[dict[str, Any]]:

@@ -160,10 +160,15 @@ def read_vehicle(bag: Path, namespace: str | None, whole: float = math.inf) -> B
 
 def _unpaired(series: Mapping[str, Series]) -> tuple[int, int]:
     """How much odometry between the set-points has none of its stamp, and how much there is."""
-    ns = rows_of(series[interface.ODOM][0], slice(None))
-    stamps = np.sort(series.get(interface.CMD_VEL, series[interface.ODOM])[0])
-    ns = ns[(ns >= stamps[0]) & (ns <= stamps[-1])]
-    return int(np.count_nonzero(stamps[np.searchsorted(stamps, ns)] != ns)), len(ns)
+    odometry, _ = series[interface.ODOM]
+    stamps, _ = series.get(interface.CMD_VEL, series[interface.ODOM])
+    stamps, met, count = stamps if _is_rising(stamps) else np.sort(stamps), 0, 0
+    for here in slices(len(odometry)):
+        ns = rows_of(odometry, here)
+        between = ns[(ns >= stamps[0]) & (ns <= stamps[-1])]
+        met += int((stamps[np.searchsorted(stamps, between)] == between).sum())
+        count += len(between)
+    return count - met, count
 
 
 def _dropped(role: str, stamps: np.ndarray, kept: int) -> list[str]:

@@ -121,6 +121,12 @@ def test_plain_aliases_are_fine(tmp_path: Path) -> None:
     assert read_yaml(path, 'vehicle')['b'] == [1, 2, 3, 4, 5, 6]
 
 
+@pytest.mark.parametrize('tag', ['', '!!int '])
+def test_integers_beyond_every_float_are_infinite(tag: str) -> None:
+    read = parse_any_yaml(f'a: {tag}{"9" * 400}\nb: {tag}-{"9" * 400}\nc: {2**70}\n', 'a text')
+    assert read == {'a': math.inf, 'b': -math.inf, 'c': 2**70}
+
+
 def test_what_was_read_may_be_changed_and_is_read_anew() -> None:
     text = 'a: {b: [1]}\n'
     parse_any_yaml(text, 'a text')['a']['b'].append(2)

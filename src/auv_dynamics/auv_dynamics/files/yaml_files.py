@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 MOST_ENTRIES = 100_000  # of a text, with its aliases written out
 LONGEST_TEXT = 4 << 20  # characters
+BEYOND = 1e300  # integers are infinite, as floats are beyond 1.8e308
 FAST_LEVELS = 50  # below which one may say that these are too many
 
 
@@ -69,8 +70,14 @@ def _unique_mapping(loader: yaml.SafeLoader, node: yaml.MappingNode) -> dict[str
     return seen
 
 
+def _bounded_int(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> float:
+    value = loader.construct_yaml_int(node)
+    return value if abs(value) < BEYOND else math.inf if value > 0 else -math.inf
+
+
 for _each in (_Loader, _FastLoader):
     _each.add_constructor('tag:yaml.org,2002:map', _unique_mapping)
+    _each.add_constructor('tag:yaml.org,2002:int', _bounded_int)
 
 
 class _Dumper(yaml.SafeDumper):

@@ -154,6 +154,12 @@ class _Dumper(yaml.SafeDumper):
         return True
 
 
+class _FastDumper(getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type: ignore[misc]
+    """The same by libyaml, in a fifth of the time."""
+
+    ignore_aliases = _Dumper.ignore_aliases
+
+
 def counts_in(document: Mapping[str, Any]) -> dict[str, int]:
     """Topic -> number of its messages, of those that have any, as the metadata of a bag say."""
     every = document['topics_with_message_count']
@@ -162,7 +168,10 @@ def counts_in(document: Mapping[str, Any]) -> dict[str, int]:
 
 def as_text(document: Mapping[str, Any]) -> str:
     """Text of a metadata.yaml."""
-    return yaml.dump({ROOT: document}, Dumper=_Dumper, sort_keys=False)
+    try:
+        return yaml.dump({ROOT: document}, Dumper=_FastDumper, sort_keys=False)
+    except UnicodeEncodeError:  # the name of a file is no text
+        return yaml.dump({ROOT: document}, Dumper=_Dumper, sort_keys=False)
 
 
 @lru_cache(64)  # topics mostly offer the same

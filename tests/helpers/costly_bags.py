@@ -115,7 +115,7 @@ def long_schema(count: int) -> bytes:
 
 def long_maps(count: int) -> bytes:
     """Channels with very much to be said of them."""
-    about = b''.join(text(f'{i}') + text('') for i in range(count // 200))
+    about = b''.join(text(f'{i}') + text('') for i in range(count // 400))
     return file_of(chunk(schema(1) + b''.join(channel(i, '/x', 1, about) for i in range(50))))
 
 
@@ -123,7 +123,7 @@ def policies(count: int) -> bytes:
     """Channels whose offered profiles are YAML that takes long, or that explodes."""
     lines = ['- &a [0,0,0,0,0,0,0,0,0,0]', *['- &b [*a,*a,*a,*a,*a,*a,*a,*a,*a,*a]'] * 90]
     about = text('offered_qos_profiles') + text('\n'.join(lines))
-    numbers = range(min(count // 500, 2000))
+    numbers = range(min(count // 1000, 1000))
     found = b''.join(channel(i, f'/x{i}', 1, about) for i in numbers)
     return file_of(chunk(schema(1) + found + message(1)))
 

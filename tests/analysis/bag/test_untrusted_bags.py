@@ -294,9 +294,11 @@ def test_a_chunk_is_its_tables_and_definitions_in_their_order() -> None:
     head = [record(schema), record(channels[0])]
     parts = [*head, *sent[:3], other, record(channels[1]), sent[3]]
     taken = list[tuple[int, int]]()
-    counts = SimpleNamespace(most=9, take=lambda *told: taken.append(told))
+    noted = list[object]()
+    counts = SimpleNamespace(most=9, take=lambda *told: taken.append(told), note=noted.append)
     first, second, table, third, last = chunks.contents_of(b''.join(parts), counts)
     assert (first, second, third) == (schema, *channels)
+    assert noted == [schema, *channels]
     assert taken == [(8, sum(map(len, [*head, other, record(channels[1])])))]
     assert [table.payload(i) for i in range(3)] == [b'', b'a', b'ab']
     assert (last.payload(0), last.log_times.tolist()) == (b'abc', [6])
@@ -421,8 +423,13 @@ def usual(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, BagContents]:
     return bag, read_bag(bag)
 
 
-@pytest.mark.parametrize('inner', ['x,x,x', '', '[]', '{}', '!!pairs [a: b]'])
-@pytest.mark.parametrize('name', ['params.yaml', 'scenario.yaml', 'vehicle.yaml'])
+@pytest.mark.parametrize(
+    ('name', 'inner'),
+    [
+        *(('params.yaml', inner) for inner in ('x,x,x', '', '[]', '{}', '!!pairs [a: b]')),
+        ('scenario.yaml', ''), ('vehicle.yaml', ''),
+    ],
+)  # fmt: skip
 def test_attached_yaml_whose_aliases_explode(
     usual: tuple[Path, BagContents], name: str, inner: str
 ) -> None:

@@ -137,6 +137,7 @@ def contents_of(
         kind = DEFINITIONS.get(int(opcodes[i])) if i < len(places) else None
         if kind is not None:
             found.append(kind.read(Body(data[int(places[i]) + PREFIX.size : int(ends[i])])))
+            counts.note(found[-1])
     return found
 
 

@@ -359,7 +359,7 @@ class McapFile:
             proven = body[-4:] != bytes(4)
         elif opcode in KINDS:
             parts.append(KINDS[opcode].read(Body(body)))
-        for part in parts:
+        for part in parts if opcode != Opcode.CHUNK else ():  # which counts as it is read
             self._counts.note(part)
         self._verify(frame, parts[0] if parts else None)
         return Read(opcode, start, end, parts, proven, compression)

@@ -3,6 +3,7 @@
 import os
 import time
 from collections import Counter
+from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -87,6 +88,7 @@ def seen_by_rosbags(bag: Path) -> Counter:
         return Counter((c.topic, t, bytes(d)) for c, t, d in reader.messages())
 
 
+@lru_cache(8)
 def places(data: bytes) -> list[tuple[int, int, Any]]:
     """Begin, end and record of all records of an undamaged file."""
     found, place = [], 8
@@ -120,6 +122,7 @@ def hoped_for(data: bytes, touched: Any) -> tuple[list[Row], list[str]]:
     return rows, names
 
 
+@lru_cache(8)
 def topics_of(data: bytes) -> dict[int, str]:
     """Channel id -> topic, of an undamaged file."""
     records = [record for _, _, record in places(data)]

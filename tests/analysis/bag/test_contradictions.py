@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from helpers import sea_trials
 from helpers.foreign_bags import (
     SECOND,
@@ -17,6 +18,7 @@ from helpers.foreign_bags import (
     simulated,
     write,
 )
+from helpers.foreign_logs import STATE, TABLES, tables, text_of
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import cumulative_trapezoid
 
@@ -43,7 +45,6 @@ from auv_analysis.runs.run import Run
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.kinematics import quaternion
 
-KEYS = {'odometry': '/o', 'wrench': '/w', 'frames': 'enu_flu'}
 TERMS = {  # two incommensurable sines per axis: motion enough for a delay to show
     'surge': (0.5, 1.1), 'sway': (0.4, 1.3), 'heave': (0.3, 0.9),
     'roll': (0.05, 1.7), 'pitch': (0.06, 1.2), 'yaw': (0.3, 0.8),
@@ -66,10 +67,9 @@ def run() -> Run:
 
 
 def bag_of(run: Run, folder: Path, tau: Run | None = None, wrench_later: float = 0.0) -> Path:
-    maker, seen = Maker(), motion(run, enu=True, keep=slice(None, None, 2))
-    forces = motion(tau or run, enu=True)
+    forces = motion(tau or run, enu=False)
     forces = forces._replace(t=forces.t + wrench_later)
-    return write(folder / 'dive', simple(seen, maker, '/o', '/w', UNNAMED, forces), maker)
+    return tables(folder / 'dive', motion(run, enu=False, keep=slice(None, None, 2)), forces)
 
 
 def true_nu(run: Run, found: Run) -> np.ndarray:
@@ -83,7 +83,7 @@ def said(run: Run, word: str) -> list[str]:
 
 
 def test_a_sound_recording_has_no_contradictions(run, tmp_path) -> None:
-    found = loaded(bag_of(run, tmp_path), **KEYS)
+    found = loaded(bag_of(run, tmp_path), **TABLES)
     for word in ('not the rate', 'behind', 'is zero', 'bursts'):
         assert not said(found, word), word
     assert said(found, 'nor an error of the model')
@@ -93,12 +93,11 @@ def test_an_angular_velocity_that_is_not_the_rate_of_the_attitude_is_named(run, 
     nu = run.nu.copy()
     nu[:, 5] = 0.0
     bag = bag_of(replace(run, nu=nu), tmp_path, tau=run)
-    (note,) = said(loaded(bag, **KEYS), 'not the rate of the attitude')
+    (note,) = said(loaded(bag, **TABLES), 'not the rate of the attitude')
     assert 'yaw 0 throughout in place of' in note
     assert 'roll' not in note
     file = tmp_path / 'map.yaml'
-    file.write_text('odometry: /o\nwrench: /w\nframes: enu_flu\nvehicle: rexrov\n'
-                    'rates: from attitude\n')  # fmt: skip
+    file.write_text(yaml.safe_dump(TABLES | {'vehicle': 'rexrov', 'rates': 'from attitude'}))
     mended = loaded(bag, file)
     assert not said(mended, 'not the rate')
     inner = slice(50, -50)
@@ -108,32 +107,30 @@ def test_an_angular_velocity_that_is_not_the_rate_of_the_attitude_is_named(run, 
 
 def test_an_angular_velocity_of_the_other_sign_is_said_to_be_that(run, tmp_path) -> None:
     bag = bag_of(replace(run, nu=run.nu * [1, 1, 1, 1, 1, -1]), tmp_path, tau=run)
-    (note,) = said(loaded(bag, **KEYS), 'not the rate of the attitude')
+    (note,) = said(loaded(bag, **TABLES), 'not the rate of the attitude')
     assert ' rad/s, with the other sign;' in note
     bag = bag_of(replace(run, nu=run.nu * [1, 1, 1, 1, 1, 0.5]), tmp_path / 'half', tau=run)
-    (note,) = said(loaded(bag, **KEYS), 'not the rate of the attitude')
+    (note,) = said(loaded(bag, **TABLES), 'not the rate of the attitude')
     half, whole, apart = (float(word) for word in note.split() if word[0] == '0')
     assert 'apart' in note
     assert (half / whole, apart / whole) == pytest.approx((0.5, 0.5), abs=0.03)
 
 
 def test_a_late_velocity_is_told_and_taken_off(run, tmp_path) -> None:
-    late = 0.2
-    maker, seen = Maker(), motion(run, enu=True, keep=slice(None, None, 2))
-    messages = simple(seen, maker, '/o', '/w', UNNAMED, motion(run, enu=True))
-    for i, ns in enumerate(nanoseconds(seen.t).tolist()):
-        stamp = ns + round(late * SECOND)
-        twist = maker.six('Twist', seen.twist[i])
-        messages.append(('/dvl', stamp, maker.stamped('Twist', stamp, 'base_link', twist)))
-    bag = write(tmp_path / 'dive', messages, maker)
-    keys = {'pose': '/o', 'wrench': '/w', 'frames': 'enu_flu'}
-    found = loaded(bag, **keys, twist='/dvl')
+    late, seen = 0.2, motion(run, enu=False, keep=slice(None, None, 2))
+    bag = tables(tmp_path / 'dive', seen, motion(run, enu=False))
+    rows = np.column_stack([seen.t + late, seen.twist])
+    (bag / 'dvl.csv').write_text('t,u,v,w,p,q,r\n' + text_of(rows))
+    keys = {'stamp': 't', 'frames': 'ned_fsd', 'wrench': TABLES['wrench'],
+            'pose': {'topic': 'motion', 'fields': {name: name for name in STATE[:7]}}}  # fmt: skip
+    twist = {'topic': 'dvl', 'fields': {name: name for name in STATE[7:]}}
+    found = loaded(bag, **keys, twist=twist)
     notes = said(found, 'behind the position')
     assert len(notes) == 1
     value, error = (float(x) for x in notes[0].split('velocity is ')[1].split(' s')[0].split(' ± '))
     assert abs(value - late) <= max(3.0 * error, 0.015)
     assert len(said(found, 'behind the attitude')) == 1
-    mended = loaded(bag, **keys, twist={'topic': '/dvl', 'delay': late})
+    mended = loaded(bag, **keys, twist=twist | {'delay': late})
     assert not said(mended, 'behind the')
     truth = true_nu(run, mended)
     assert_allclose(mended.nu, truth, atol=2e-3)
@@ -366,11 +363,11 @@ def test_the_error_of_a_delay_under_noise_is_its_error() -> None:
 def test_a_wrench_that_acts_behind_its_stamps_is_told_and_taken_off(later, run, tmp_path) -> None:
     """Stamped 0.15 or 0.3 s before it acts; F shrinks when the map says so."""
     bag = bag_of(run, tmp_path, wrench_later=later)
-    found = loaded(bag, **KEYS)
+    found = loaded(bag, **TABLES)
     (note,) = said(found, 'the wrench acts')
     value = float(note.split('acts ')[1].split(' ')[0])
     assert value == pytest.approx(-later, abs=0.03)
-    keys = KEYS | {'wrench': {'topic': '/w', 'delay': -later}}
+    keys = TABLES | {'wrench': TABLES['wrench'] | {'delay': -later}}
     mended = loaded(bag, **keys)
     assert not said(mended, 'the wrench acts')
     sizes = [np.sqrt((one.unexplained**2).mean(axis=0)) for one in (found, mended)]
@@ -412,11 +409,11 @@ def test_a_smooth_motion_tells_no_delay_of_its_wrench() -> None:
 
 def test_a_wrench_of_zeros_is_named(run, tmp_path) -> None:
     none = replace(run, tau=0.0 * run.tau)
-    found = loaded(bag_of(run, tmp_path, tau=none), **KEYS)
+    found = loaded(bag_of(run, tmp_path, tau=none), **TABLES)
     (note,) = said(found, 'is zero')
-    assert note.startswith('/w: every wrench is zero')
+    assert note.startswith('force: every wrench is zero')
     one = replace(run, tau=run.tau * [0, 0, 1, 0, 0, 0])
-    assert not said(loaded(bag_of(run, tmp_path / 'one', tau=one), **KEYS), 'is zero')
+    assert not said(loaded(bag_of(run, tmp_path / 'one', tau=one), **TABLES), 'is zero')
 
 
 def test_each_wrench_of_zeros_is_named_by_its_role() -> None:
@@ -434,10 +431,11 @@ def test_stamps_in_bursts_are_told_and_spread(run, tmp_path) -> None:
     steps = np.arange(len(forces.t))
     burst = forces._replace(t=forces.t[steps - steps % 5] + 1e-5 * (steps % 5))  # five at once
     bag = write(tmp_path / 'dive', simple(seen, maker, '/o', '/w', UNNAMED, burst), maker)
-    found = loaded(bag, **KEYS)
+    keys = {'odometry': '/o', 'wrench': '/w', 'frames': 'enu_flu'}
+    found = loaded(bag, **keys)
     (note,) = said(found, 'bursts')
     assert note.startswith('/w: its stamps come in bursts, 80 %')
-    keys = KEYS | {'wrench': {'topic': '/w', 'stamps': 'uniform'}}
+    keys['wrench'] = {'topic': '/w', 'stamps': 'uniform'}
     mended = loaded(bag, **keys)
     assert said(mended, 'spread evenly, as told')
     errors = [np.abs(one.tau - run.tau[::2][: one.samples]).mean() for one in (found, mended)]

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.foreign_bags import UNNAMED, Maker, loaded, motion, simple, simulated, write
+from helpers.foreign_bags import loaded, motion, simulated
+from helpers.foreign_logs import TABLES, tables
 from numpy.testing import assert_allclose
 
 from auv_analysis.runs.run import Run
 from auv_dynamics.vehicle import DOFS
 
-KEYS = {'odometry': '/o', 'wrench': '/w', 'frames': 'enu_flu'}
 NOISE = np.array([3e-3, 3e-3, 3e-3, 2e-3, 2e-3, 2e-3])  # m/s, rad/s
 LEVEL = {'initial': {'eta': [0.0] * 6, 'nu': [0.0] * 6}}
 NONE = {'disturbance': []}
@@ -27,10 +27,8 @@ def recorded(run: Run, folder: Path, noise: np.ndarray, seed: int = 0, **keys) -
     rng = np.random.default_rng(seed)
     kept = np.sort(rng.choice(run.samples, run.samples // 2, replace=False))
     noisy = replace(run, nu=run.nu + noise * rng.standard_normal(run.nu.shape))
-    seen, forces = motion(noisy, enu=True, keep=kept), motion(run, enu=True)
-    maker = Maker()
-    bag = write(folder / f'seed_{seed}', simple(seen, maker, '/o', '/w', UNNAMED, forces), maker)
-    return loaded(bag, **KEYS, **keys)
+    seen, forces = motion(noisy, enu=False, keep=kept), motion(run, enu=False)
+    return loaded(tables(folder / f'seed_{seed}', seen, forces), **TABLES, **keys)
 
 
 @pytest.fixture(scope='module')

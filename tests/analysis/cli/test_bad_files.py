@@ -11,6 +11,7 @@ import yaml
 
 from auv_analysis.cli import main, scenario_runs
 from auv_dynamics.files.shipped import shipped
+from auv_dynamics.files.yaml_files import parse_any_yaml
 
 HEADER = 't,surge,sway,heave,roll,pitch,yaw'
 LAST = '30,0,0,0,0,0,0'
@@ -217,12 +218,14 @@ def _written(data: dict, key: str, text: str, path: Path) -> Path:
     place[last] = 'PLACEHOLDER'
     if not text:
         del place[last]
-    path.write_text(yaml.safe_dump(data, width=1000).replace('PLACEHOLDER', text))
+    spelt = yaml.dump(data, Dumper=yaml.CSafeDumper, width=1000)
+    path.write_text(spelt.replace('PLACEHOLDER', text))
     return path
 
 
 def _shipped(kind: str, name: str) -> dict:
-    return yaml.safe_load(shipped(kind, name).read_text(encoding='utf-8'))
+    path = shipped(kind, name)
+    return parse_any_yaml(path.read_text(encoding='utf-8'), path)
 
 
 def _refused(capsys: pytest.CaptureFixture, scenario: Path) -> str:

@@ -260,7 +260,7 @@ def test_memory_does_not_grow_with_the_bag(tmp_path) -> None:
 
 
 def test_a_sketch_of_a_long_run_holds_few_points(tmp_path) -> None:
-    bag = make_bag(tmp_path / 'bag', 20_000)
+    bag = make_bag(tmp_path / 'bag', 6000)
     drawn = digest(open_bag(bag, whole=10).run)
     lines = [t.line()[0] for traces in drawn.traces.values() for t in traces]
     assert max(map(len, lines)) <= 4000

@@ -36,7 +36,7 @@ CURVE = 't200_16v'
 def run(tmp_path_factory) -> Run:
     amplitudes, band, _ = sea_trials.SWINGS[VEHICLE]
     slower = sea_trials.multisine(tuple(0.7 * amplitude for amplitude in amplitudes), band)
-    return sea_trials.trial(tmp_path_factory.mktemp('x'), VEHICLE, duration=30.0, setpoint=slower)[
+    return sea_trials.trial(tmp_path_factory.mktemp('x'), VEHICLE, duration=20.0, setpoint=slower)[
         1
     ]
 

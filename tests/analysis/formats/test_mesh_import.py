@@ -256,9 +256,10 @@ def test_the_inertia_is_as_it_was_given_or_else_that_of_the_hull(imported):
 
 
 @pytest.mark.parametrize(('units', 'length'), [('mm', 0.001), ('cm', 0.01), ('in', 0.0254)])
-def test_units_of_a_mesh(imported, rough, units, length):
+@pytest.mark.usefixtures('dry')
+def test_units_of_a_mesh(imported, units, length):
     hull = trimesh.creation.box(np.array([2.0, 1.0, 0.5]) / length)
-    vehicle, _ = imported(hull, *rough, units=units, mass=RHO)
+    vehicle, _ = imported(hull, units=units, mass=RHO)
     assert vehicle.buoyancy == pytest.approx(RHO * 9.81, rel=1e-6)
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.foreign_bags import UNNAMED, Maker, loaded, motion, simple, simulated, write
+from helpers.foreign_logs import TABLES, tables
 from numpy.testing import assert_allclose, assert_array_equal
 from rich.console import Console
 from scipy.integrate import trapezoid
@@ -52,11 +53,10 @@ def holed(
 ) -> Run:
     """The run without the messages between two times, s, of odometry and of wrench."""
     states, forces = (
-        motion(run, enu=True, keep=(run.t <= begin) | (run.t >= end))
+        motion(run, enu=False, keep=(run.t <= begin) | (run.t >= end))
         for begin, end in (odometry, wrench)
     )
-    listed = simple(states, Maker(), '/o', '/w', UNNAMED, forces)
-    return loaded(write(folder / 'other', listed, Maker()), **{**KEYS, **keys})
+    return loaded(tables(folder / 'other', states, forces), **{**TABLES, 'step': 0.01, **keys})
 
 
 def test_samples_stop_and_begin_again_where_any_topic_does(run, tmp_path) -> None:
@@ -74,8 +74,8 @@ def test_samples_stop_and_begin_again_where_any_topic_does(run, tmp_path) -> Non
     assert_allclose(found.tau, run.tau[~inside], rtol=1e-9)
     assert found.valid_share == pytest.approx(np.count_nonzero(~inside) / run.samples)
     said = ' '.join(found.notes)
-    assert '/o: 1 pause longer than 0.05 s, 0.5 s together' in said
-    assert '/w: 1 pause longer than 0.05 s, 0.8 s together' in said
+    assert 'motion: 1 pause longer than 0.05 s, 0.5 s together' in said
+    assert 'force: 1 pause longer than 0.05 s, 0.8 s together' in said
     assert 'no samples in 2 gaps, 1.3 s together' in said
 
 

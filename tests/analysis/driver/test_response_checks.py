@@ -40,7 +40,6 @@ OTHERWISE = {  # what a right driver of another vehicle than the model's may be
     'quick and late': {'inertia': 0.3, 'delay': 0.3},
     'slow and late': {'inertia': 3.0, 'delay': 0.15},
     'dragging': {'damping': 3.0, 'delay': 0.3},
-    'with lag': {'lag': 0.15, 'delay': 0.1},
     'quick, with lag, biased and noisy': {
         'inertia': 0.3,
         'lag': 0.15,

@@ -31,6 +31,7 @@ from helpers.report_pages import tokens
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.markers import MarkerStyle
+from matplotlib.text import Text
 
 from auv_analysis.metrics.quantities import SIGNALS
 from auv_analysis.report import plots
@@ -821,3 +822,17 @@ def test_the_lines_of_a_panel_are_named_above_it_at_its_right() -> None:
     words, panel = axes.get_legend().get_window_extent(), axes.get_window_extent()
     assert words.y0 > panel.y1
     assert panel.x1 - 20 < words.x1 < panel.x1 + 1
+
+
+def test_the_letter_of_a_panel_stands_beside_a_power_of_ten_and_above_numbers() -> None:
+    with plots.style():
+        figure = plots.new_figure(2.0)
+        left, right = figure.subplots(1, 2)
+        left.plot([0.0, 3e7])
+        plots.draw_grid(right, plots.HeatMap(np.ones((1, 1)), ['column'], ''))
+        for i, axes in enumerate((left, right)):
+            plots.letter(axes, i)
+        figure.draw_without_rendering()
+    shown = {text.get_text(): text.get_window_extent() for text in figure.findobj(Text)}
+    assert shown['1e7'].x1 < shown['(a)'].x0
+    assert shown['column'].y1 < shown['(b)'].y0

@@ -48,8 +48,15 @@ from auv_analysis.report.run_plots import (
     energy_shares,
     fitting,
     inputs,
+    settling,
+    six_signals,
 )
-from auv_analysis.report.wrench_plots import _applied_caption, _panel, applied_figure
+from auv_analysis.report.wrench_plots import (
+    _applied_caption,
+    _panel,
+    applied_figure,
+    estimate_figure,
+)
 from auv_analysis.runs.run import Run
 from auv_gvc_controller.laws.model import control_model
 
@@ -455,38 +462,34 @@ def test_a_caption_says_what_the_actuators_did(runs) -> None:
         assert text not in not_there
 
 
-def test_a_command_that_leaves_its_panel_is_told_with_its_sign_and_time(runs, tmp_path) -> None:
+def test_a_command_that_leaves_its_panel_is_told_with_its_sign_and_time(runs) -> None:
     run = runs['three']
     tau, applied = 0.0 * run.tau, 0.01 * run.tau
     tau[:, [0, 4]], tau[77, 4], applied[:, 0] = run.tau[:, [0, 4]], -50_000.0, 0.0
-    three = {'three': replace(run, tau=tau, applied=applied)}
-    figures, captions = _drawn(three, tmp_path)
-    pitch = figures['inputs_three'].axes[3]
+    three = digests({'': replace(run, tau=tau, applied=applied)})['']
+    figure, _, caption = applied_figure(three, None)
+    pitch = figure.axes[3]
     assert pitch.get_title(loc='right') == f'command to −50\u202f000 N m at {run.t[77]:.2f} s'
     most = np.abs(applied[:, 4]).max()
     assert pitch.get_ylim() == pytest.approx((-1.25 * most, 1.25 * most))
-    assert 'The commands in pitch leave the panel' in captions['inputs_three']
+    assert 'The commands in pitch leave the panel' in caption
     axes = plots.new_figure(2.0).subplots()
-    assert _panel(axes, digests(three)['three'], 4, 1e3)
+    assert _panel(axes, three, 4, 1e3)
     assert levels(axes) == [-1e3, 1e3], 'far above what is applied, not what is commanded'
     assert axes.get_ylim() == (-1250.0, 1250.0)
-    assert [
-        a.get_title(loc='right') for k, a in enumerate(figures['inputs_three'].axes) if k != 3
-    ] == [''] * 5
-    assert [t.get_text() for t in figures['inputs_three'].legends[0].get_texts()] == [
-        'commanded',
-        'applied',
-    ]
+    others = [a.get_title(loc='right') for k, a in enumerate(figure.axes) if k != 3]
+    assert others == [''] * 5
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == ['commanded', 'applied']
 
 
 @pytest.mark.parametrize(('name', 'kind'), [('told', 'unexplained'), ('lost', 'required_wrench')])
 def test_estimates_of_foreign_runs_with_their_standard_errors(
-    foreign, tmp_path, name: str, kind: str
+    foreign, name: str, kind: str
 ) -> None:
-    run = foreign[name]
+    run, drawn = foreign[name], digests(foreign)[name]
     values, error = getattr(run, kind), getattr(run, f'{kind}_error')
-    figures, captions = _drawn({name: run}, tmp_path)
-    figure = figures[f'{kind}_{name}']
+    figure, _, caption = estimate_figure(drawn, kind)
     symbol = 'F' if kind == 'unexplained' else r'\tau'
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     estimated = f'{"F" if kind == "unexplained" else "τ"}, estimated'
@@ -514,8 +517,8 @@ def test_estimates_of_foreign_runs_with_their_standard_errors(
         near(high, (values + 2 * error)[:, i])
         assert axes.get_xlabel() == ('$t$ (s)' if i % 3 == 2 else '')
         assert axes.get_xlim() == (START, START + 12.0)
-    assert (f'inputs_{name}' in figures) == (name == 'told')
-    assert captions[f'{kind}_{name}'].startswith(f'{kind.replace("_", " ").capitalize()}')
+    assert (six_signals('tau', drawn)[0] is not None) == (name == 'told')
+    assert caption.startswith(f'{kind.replace("_", " ").capitalize()}')
 
 
 def _text(value: float) -> str:
@@ -569,14 +572,14 @@ def test_settling_bands_stand_under_faults_where_the_runs_share_them(runs, tmp_p
         assert levels(axes) == pytest.approx([-band, band])
 
 
-def test_what_was_not_recorded_is_said_in_its_panel(runs, foreign, tmp_path) -> None:
+def test_what_was_not_recorded_is_said_in_its_panel(runs, foreign) -> None:
     lost = {name: replace(run, nu=run.nu.copy(), tau=run.tau.copy()) for name, run in runs.items()}
     told = foreign['told']
     wrench = told.unexplained.copy()
     wrench[:, 1] = np.nan
     for run in lost.values():
         run.nu[:, 1] = run.tau[:, 1] = np.nan
-    alone, _ = _drawn({'told': replace(told, unexplained=wrench, faults=())}, tmp_path)
+    alone = digests({'': replace(told, unexplained=wrench, faults=())})['']
     acted = lost.pop('three')
     applied = np.where(np.isin(np.arange(6), (1, 2)), np.nan, acted.applied)
     panels = applied_figure(digests({'': replace(acted, applied=applied)})[''], None)[0].axes
@@ -584,17 +587,19 @@ def test_what_was_not_recorded_is_said_in_its_panel(runs, foreign, tmp_path) -> 
     assert empty == ['(b) sway'], 'of heave there is the command'
     lost['one'].tau[:, 3] = 0.0
     lost['two'].nu[:, 2] = lost['two'].tau[:, 2] = np.nan  # heave is seen in the other run
-    figures, captions = _drawn(lost, tmp_path)
-    scales = [axes.get_yscale() for axes in figures['inputs_compared'].axes]
+    drawn = digests(lost)
+    compared = inputs(drawn)[0]
+    scales = [axes.get_yscale() for axes in compared.axes]
     assert scales[3] == 'linear', 'what does nothing is not far from what does'
-    for figure in (figures['settling'], figures['inputs_compared'], alone['unexplained_told']):
+    for figure in (settling(drawn)[0], compared, estimate_figure(alone, 'unexplained')[0]):
         for axes in figure.axes:
             gone = axes.get_title(loc='left').endswith('sway')
             assert [text.get_text() for text in axes.texts] == ['not recorded'] * gone
             assert bool(artists.lines(axes)) != gone
-    assert captions['kinetic_energy'].startswith('Kinetic energy: not all velocities were recorded')
-    assert captions['energy_shares'].startswith('Shares of kinetic energy: not all velocities')
-    assert 'Not recorded, or resting on what was not: sway.' in captions['errors_one']
+    assert energy(drawn, drawn['two'])[2].startswith('Kinetic energy: not all velocities were rec')
+    assert energy_shares(drawn)[2].startswith('Shares of kinetic energy: not all velocities')
+    lacking = 'Not recorded, or resting on what was not: sway.'
+    assert lacking in six_signals('error', drawn['one'])[2]
 
 
 def test_no_figure_is_without_an_oracle(three, pair, foreign) -> None:
@@ -757,7 +762,8 @@ def test_faults_are_shaded_in_interactive_panels_where_they_are(page) -> None:
 def test_a_page_spans_all_of_its_runs_and_names_their_dashes(runs) -> None:
     one, two = (runs[name].part(slice(0, 61)) for name in ('one', 'two'))
     later = replace(two, t=two.t + 5.0, faults=())
-    found = interactive(digests({'one': one, 'later': later}))
+    with artists.captured():
+        found = interactive(digests({'one': one, 'later': later}))
     assert (found.start, found.end) == (START, START + 8.0)
     assert found.runs == {'one': '', 'later': '7 3'}
     assert found.dofs == dict(zip(DOFS, plots.COLOURS, strict=True))

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pyarrow.parquet as parquet
 import pytest
-from helpers import shown
+from helpers import artists, shown
 from helpers.report_pages import Page, check_numbers
 
 from auv_analysis.cli import main
@@ -21,9 +21,9 @@ from auv_dynamics.kernel.compile import sources_digest
 
 
 @pytest.fixture(scope='module')
-def folder(tmp_path_factory, composing) -> Path:
+def folder(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp('document') / 'out'
-    with composing():
+    with artists.undrawn():
         main.main(['simulate', 'case1', '--out', str(out)])
     return out
 

@@ -115,7 +115,7 @@ def test_lines_of_an_error_stay_lines() -> None:
     assert printable('Δξ – ½ · 漢\u00a0字') == 'Δξ – ½ · 漢\u00a0字'
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_names_that_look_like_symbols_stay_as_they_are(tmp_path: Path, capsys) -> None:
     names = ('dolphin', 'alphabet', 'psi_delta', 'nu-shell', 'omega3', 'tau', 'k_D', 'Lambda')
     gvc = {'law': 'gvc', 'k_D': 6.0, 'k_I': 2.0, 'Lambda': 0.5, 'Gamma': 20.0}

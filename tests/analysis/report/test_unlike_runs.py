@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from helpers import artists
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.report.run_report import write_report
@@ -82,13 +83,15 @@ def folders(tmp_path_factory: pytest.TempPathFactory, composing) -> dict[str, Pa
         runs[name], source=FOREIGN, disturbance=None, nu_d=unknown, gains={}, law='', applied=None
     )
     few = {'foreign': foreign, name: runs[name]}
+    with artists.undrawn():
+        one = _written(
+            tmp_path_factory.mktemp('one'),
+            {name: runs[name] for name in ('noisy-full', 'moved-gvc')},
+            texts['noisy-full'],
+        )
     with composing():
         return {
-            'one text': _written(
-                tmp_path_factory.mktemp('one'),
-                {name: runs[name] for name in ('noisy-full', 'moved-gvc')},
-                texts['noisy-full'],
-            ),
+            'one text': one,
             'all': _written(tmp_path_factory.mktemp('all'), runs, texts),
             'few': _written(tmp_path_factory.mktemp('few'), few, {name: texts[name]}),
         }

@@ -308,6 +308,8 @@ def test_certificate_figure_says_what_it_rests_on(case1, approved):
 
 def test_certificate_is_drawn_where_26_holds_along_solutions_and_says_so(tmp_path, unrendered):
     changes = {
+        'duration': 1.0,
+        'controllers': {name: DATA['controllers'][name] for name in ('wound', 'pid')},
         'disturbance': [{'kind': 'herman2018'}, {'kind': 'model_error', 'mass': 0.1}],
         'actuators': None,
         'sensors': None,
@@ -315,7 +317,7 @@ def test_certificate_is_drawn_where_26_holds_along_solutions_and_says_so(tmp_pat
     runs, summaries, text = _study(tmp_path, hold='continuous', **changes)
     words = _text(_report(tmp_path / 'report', runs, summaries, text))
     drawn = {path.stem for path in (tmp_path / 'report/figures').glob('certificate_*.png')}
-    assert drawn == {'certificate_gvc', 'certificate_wound'}
+    assert drawn == {'certificate_wound'}
     assert 'The certificate does not apply here: F contains model_error' in words
     assert 'an identity and no proof that L decreases' in words
     assert 'first order in the step' not in words
@@ -382,7 +384,7 @@ def test_report_follows_the_readers_colour_scheme(page):
 
 
 def test_report_of_laws_without_a_certificate_has_reasons_and_no_empty_table(
-    rough, page, tmp_path, unrendered
+    rough, page, tmp_path, undrawn
 ):
     runs, summaries, text = rough
     only = {'pid': runs['pid']}

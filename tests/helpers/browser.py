@@ -28,7 +28,7 @@ def chromium() -> Iterator[Any]:
     found = next(filter(None, map(shutil.which, NAMES)), None)
     need('chromium', found)
     with sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=found)
+        browser = driver.chromium.launch(executable_path=found, args=['--disable-gpu'])
         try:
             yield browser
         finally:

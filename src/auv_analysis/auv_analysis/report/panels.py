@@ -156,7 +156,8 @@ def document(
     ends: tuple[float, float],
 ) -> list[Any]:
     """Bokeh's JSON of a document, and names of its roots: a figure per panel, ranges shared."""
-    from bokeh.document import Document  # loads slowly
+    from bokeh.core.property.validation import validate  # loads slowly
+    from bokeh.document import Document
     from bokeh.models import CrosshairTool, Range1d
     from bokeh.models.annotations import Span
 
@@ -164,7 +165,8 @@ def document(
     cursor = CrosshairTool(overlay=Span(dimension='height', line_dash=[3, 3], line_color=GREY))
     found = Document()
     columns = _columns(panels)
-    with found.models.freeze():  # else all models are collected anew at every figure
+    # else all models are collected anew at every figure, and every value is checked
+    with found.models.freeze(), validate(False):
         for panel in panels:
             plot = _figure(panel, dashes, columns, time)
             plot.add_tools(cursor)

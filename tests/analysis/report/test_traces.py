@@ -34,7 +34,7 @@ def signal(seed: int, n: int) -> tuple[np.ndarray, np.ndarray]:
 
 @given(
     seed=st.integers(0, 999),
-    n=st.integers(1, 30_000),
+    n=st.integers(1, 16_000),
     rows=st.integers(500, 20_000),
     logarithmic=st.booleans(),
 )
@@ -59,7 +59,7 @@ def test_as_many_samples_as_columns_have_points_are_all_drawn(more: int) -> None
     assert (len(trace.line()[0]) == len(t)) is (more == 0)
 
 
-@given(seed=st.integers(0, 999), n=st.integers(FEW + 1, 30_000))
+@given(seed=st.integers(0, 999), n=st.integers(FEW + 1, 16_000))
 @quick
 def test_columns_keep_their_extremes_in_the_order_of_time(seed, n) -> None:
     t, y = signal(seed, n)

@@ -29,7 +29,7 @@ from auv_analysis.runs.run import Run
 
 EMPTY_TAGS = {'meta', 'img', 'br', 'input'}
 SIX = ('lumped_error_gvc', 'uncertainty_gvc', 'inputs_gvc', 'delta_xi', 'delta_pi')
-ALIKE = {**dict.fromkeys(SIX, 'errors_gvc'), 'inputs_compared': 'settling'}  # by one function
+ALIKE = {**dict.fromkeys(SIX, 'errors_gvc'), 'compared_inputs': 'settling'}  # by one function
 SCRIPTS = re.compile(r'<script.*?</script>', re.DOTALL)
 
 

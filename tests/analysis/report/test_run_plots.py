@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ from matplotlib.markers import MarkerStyle
 from matplotlib.text import Text
 
 from auv_analysis.metrics.quantities import SIGNALS
-from auv_analysis.report import plots
+from auv_analysis.report import plots, run_plots
 from auv_analysis.report.digest import digests
 from auv_analysis.report.faults import fault_figure
 from auv_analysis.report.panels import document, interactive, panel_sets
@@ -253,8 +254,8 @@ def test_errors_still_to_come_are_those_of_their_runs(pair, three, runs, togethe
 
 
 @pytest.mark.parametrize('together', ['pair', 'three'])
-def test_inputs_compared_are_those_of_their_runs(pair, three, runs, together: str) -> None:
-    figure = (pair if together == 'pair' else three)[0]['inputs_compared']
+def test_compared_inputs_are_those_of_their_runs(pair, three, runs, together: str) -> None:
+    figure = (pair if together == 'pair' else three)[0]['compared_inputs']
     names = ['one', 'two'] if together == 'pair' else list(runs)
     for i, axes in enumerate(figure.axes):
         shown = named(axes, figure.legends[0])
@@ -267,8 +268,17 @@ def test_inputs_compared_are_those_of_their_runs(pair, three, runs, together: st
         assert (axes.get_xscale(), axes.get_yscale()) == ('log', 'linear')
 
 
+def test_no_name_of_a_controller_makes_its_figure_another_one(
+    runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run_plots, 'save_figures', lambda _, made: made)
+    one, two = runs['one'], runs['two']
+    drawn = [len(draw_figures({name: one, 'two': two}, tmp_path)) for name in ('one', 'compared')]
+    assert drawn[0] == drawn[1]
+
+
 def test_captions_name_the_dashes_of_each_run(three, pair, runs) -> None:
-    assert 'one solid, two dashed and three dotted' in three[1]['inputs_compared']
+    assert 'one solid, two dashed and three dotted' in three[1]['compared_inputs']
     assert 'not drawn where the set-points of the runs differ' in three[1]['settling']
     dashes = [artists._look(h)['dashes'][1] for h in three[0]['settling'].legends[0].legend_handles]
     assert [None if d is None else len(d) for d in dashes] == [None, 2, 2]
@@ -604,7 +614,7 @@ def test_what_was_not_recorded_is_said_in_its_panel(runs, foreign) -> None:
 
 def test_no_figure_is_without_an_oracle(three, pair, foreign) -> None:
     checked = {kind if kind in LEADING else f'{kind}_{name}' for kind, name in EACH}
-    checked |= {'settling', 'inputs_compared', 'kinetic_energy', 'energy_shares'}
+    checked |= {'settling', 'compared_inputs', 'kinetic_energy', 'energy_shares'}
     checked |= {'certificate_one', 'certificate_two', 'inputs_three'}
     assert set(three[0]) == checked
 

@@ -362,7 +362,7 @@ def test_files_are_listed_once_for_the_runs_that_share_them(runs) -> None:
 def test_findings_of_what_the_actuators_left(runs, summaries, largest: str) -> None:
     applied = {n: 0.01 * run.tau[:, :: -1 if largest == 'first' else 1] for n, run in runs.items()}
     acting = {n: replace(run, applied=applied[n]) for n, run in runs.items()}
-    ((text,), *_) = [v for k, v in said(acting, summaries).items() if k == 'figure-inputs_compared']
+    ((text,), *_) = [v for k, v in said(acting, summaries).items() if k == 'figure-compared_inputs']
     peaks = [np.abs(applied[n]).max(axis=0) for n in runs]
     expected = '; '.join(
         f'{p[:3].max():.1f} N and {p[3:].max():.1f} N m under {n}'
@@ -456,7 +456,7 @@ def test_each_section_shows_its_own_tables_and_figures(runs, summaries, tmp_path
         'tracking': [
             'key_figures', 'settling', '[errors_one errors_two]',
             '[lumped_error_one lumped_error_two uncertainty_one uncertainty_two]',
-            '[inputs_one inputs_two inputs_compared]',
+            '[inputs_one inputs_two compared_inputs]',
             '', 'certificate', '', '[certificate_one certificate_two]',
         ],
         'energy': ['', 'energy', 'energy_shares', '[kinetic_energy]'],

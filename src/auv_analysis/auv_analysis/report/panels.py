@@ -32,7 +32,7 @@ GROUPS = {'linear': range(3), 'angular': range(3, 6)}
 SECTIONS = {  # part of the report -> its signals, beginnings of the figures its panels stand for
     'errors': (('error',), ('errors_',)),
     'estimates': (('lumped_error', 'F', *ESTIMATES), ('lumped_error_', 'uncertainty_')),
-    'inputs': (('tau', 'applied'), ('inputs_',)),
+    'inputs': (('tau', 'applied'), ('inputs_', 'compared_inputs')),
     'certificates': ((), ('certificate_',)),
     'energy': (('energy',), ('kinetic_energy',)),
     'couplings': (('delta_xi', 'delta_pi'), ('delta_xi', 'delta_pi')),

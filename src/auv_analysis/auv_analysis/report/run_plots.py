@@ -72,7 +72,7 @@ def draw_figures(
     for name, run in drawn.items():
         made[f'inputs_{name}'] = partial(_inputs, run, (limits or {}).get(name))
     if len(drawn) > 1:
-        made['inputs_compared'] = partial(inputs, drawn)
+        made['compared_inputs'] = partial(inputs, drawn)
     for name, run in drawn.items():
         if summaries is not None and is_drawn(summaries[name]):
             made[f'certificate_{name}'] = partial(certificate_figure, run, summaries[name])

@@ -38,7 +38,7 @@ Summaries = Mapping[str, Mapping[str, Any]]
 FIGURES = {  # part of the report -> beginnings of the names of its figures
     'errors': ('errors_', 'settling'),
     'estimates': ('lumped_error_', 'uncertainty_', *(f'{kind}_' for kind in ESTIMATES)),
-    'inputs': ('inputs_',),
+    'inputs': ('inputs_', 'compared_inputs'),
     'certificates': ('certificate_',),
     'energy': ('kinetic_energy', 'energy_shares'),
     'couplings': ('delta_',),
@@ -302,7 +302,7 @@ def findings(runs: Mapping[str, RunDigest], summaries: Summaries) -> list[Senten
         tau, most = run.part('tau'), summaries[name]['effort']['max']
         if remarks := beyond_authority(run.vehicle, most, (tau.low, tau.high)):
             found.append(Sentence(f'Under {name} {"; ".join(remarks)}.', metrics))
-    found += [Sentence(_applied(runs), 'figure-inputs_compared')]
+    found += [Sentence(_applied(runs), 'figure-compared_inputs')]
     found += [
         Sentence(estimate_finding(n, s), f'table-{ESTIMATES[s["unexplained"] is None]}')
         for n, s in summaries.items()

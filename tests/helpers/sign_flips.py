@@ -13,7 +13,7 @@ from types import SimpleNamespace
 from auv_dynamics.kernel import six
 
 JIT = ('helper', 'compiled', 'specialised')
-OPPOSITE = {ast.Add: ast.Sub, ast.Sub: ast.Add}
+OPPOSITE = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.USub: ast.UAdd, ast.UAdd: ast.USub}
 SWAPPED = {'add': 'sub', 'sub': 'add'}
 
 
@@ -27,11 +27,9 @@ def is_sign(node: ast.AST) -> bool:
 
 
 def flip(node: ast.AST) -> None:
-    """Turn the sign, in place."""
-    if isinstance(node, ast.BinOp | ast.AugAssign):
+    """Turn the sign, in place; a second time, back."""
+    if isinstance(node, ast.BinOp | ast.AugAssign | ast.UnaryOp):
         node.op = OPPOSITE[type(node.op)]()
-    elif isinstance(node, ast.UnaryOp):
-        node.op = ast.UAdd()
     elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         node.func.id = SWAPPED[node.func.id]
 
@@ -70,19 +68,25 @@ def name_of(decorator: ast.expr) -> str:
     return getattr(getattr(decorator, 'func', decorator), 'id', '')
 
 
-def run(tree: ast.Module, module: str) -> SimpleNamespace:
-    """What a module defines, run from its syntax tree without numba's decorators."""
+def parsed(module: str) -> ast.Module:
+    """Syntax tree of a module without numba's decorators."""
+    tree = ast.parse(source_of(module).read_text(encoding='utf-8'))
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef):
             node.decorator_list = [d for d in node.decorator_list if name_of(d) not in JIT]
+    return tree
+
+
+def run(tree: ast.Module, module: str) -> SimpleNamespace:
+    """What a module defines, run from its syntax tree."""
     scope = {'__name__': module, 'add': six.add, 'sub': six.sub}  # one may not be imported there
-    exec(compile(ast.fix_missing_locations(tree), str(source_of(module)), 'exec'), scope)
+    exec(compile(tree, str(source_of(module)), 'exec'), scope)
     return SimpleNamespace(**scope)
 
 
 def as_written(module: str) -> SimpleNamespace:
     """The module without numba and with every sign as it is."""
-    return run(ast.parse(source_of(module).read_text(encoding='utf-8')), module)
+    return run(parsed(module), module)
 
 
 def with_one_flipped(module: str, names: Collection[str]) -> Iterator[tuple[str, SimpleNamespace]]:
@@ -94,12 +98,9 @@ def with_one_flipped(module: str, names: Collection[str]) -> Iterator[tuple[str,
     variant : what the module then defines
 
     """
-    text = source_of(module).read_text(encoding='utf-8')
-    for i in range(len(signs(ast.parse(text), names))):
-        tree = ast.parse(text)
-        node = signs(tree, names)[i]
-        line, column = node.lineno, node.col_offset
-        piece = ast.get_source_segment(text, node) or ''
+    tree = parsed(module)
+    for node in signs(tree, names):
+        place = f'{module}:{node.lineno}:{node.col_offset}: {ast.unparse(node)[:60]}'
         flip(node)
-        short = ' '.join(piece.split())[:60]
-        yield f'{module}:{line}:{column}: {short}', run(tree, module)
+        yield place, run(tree, module)
+        flip(node)

@@ -18,7 +18,7 @@ ENERGY, SETTLED = 'kinetic_energy.mean', 'overall.velocity_error.settling_time'
 SIMPLE = """
 name: simple
 scenario: case1
-block: 50
+block: 200
 vary:
   - random:
       controllers.*.k_D: {uniform: {from: 1.0, to: 3.0}}

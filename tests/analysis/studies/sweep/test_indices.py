@@ -8,7 +8,7 @@ from helpers.made_sweeps import make_sweep
 
 from auv_analysis.metrics.measures import BY_NAME
 from auv_analysis.studies.sweep.analysis import analysed
-from auv_analysis.studies.sweep.dataset import open_sweep
+from auv_analysis.studies.sweep.dataset import numbers_of, open_sweep
 from auv_analysis.studies.sweep.indices import designed, omitted
 from auv_analysis.studies.sweep.indices import indices as indices_of
 from auv_dynamics.files.shipped import shipped
@@ -21,7 +21,7 @@ SALTELLI = f"""
 name: salt
 scenario: case1
 controllers: [gvc]
-block: 256
+block: 2048
 vary:
   - grid: {{integrator: [ode5, rk4]}}
   - saltelli:
@@ -45,7 +45,11 @@ def linear(controller, values, index):
 
 
 def indices(out: Path) -> list[dict]:
-    return [r for r in analysed(open_sweep(out)).tables['indices'] if r['figure'] == ENERGY]
+    sweep, measure = open_sweep(out), BY_NAME[ENERGY]
+    (found,), notes = designed(sweep)
+    assert notes == []
+    values = numbers_of(sweep.table([ENERGY]), ENERGY)
+    return [*indices_of(sweep, found, values, measure)]
 
 
 def test_sobol_of_a_linear_figure(tmp_path: Path) -> None:
@@ -123,7 +127,8 @@ def test_what_two_designs_lack_is_said_once(tmp_path: Path) -> None:
 
 
 def test_an_unfinished_design_uses_its_whole_base_points(tmp_path: Path) -> None:
-    out = make_sweep(tmp_path, SALTELLI, linear, range(5))  # 5 * 256 of 2 * 2048 rollouts
+    text = SALTELLI.replace('block: 2048', 'block: 256')
+    out = make_sweep(tmp_path, text, linear, range(5))  # 5 * 256 of 2 * 2048 rollouts
     found = [row for row in indices(out) if row['with'] is None]
     assert {(row['case'], row['points']) for row in found} == {('integrator = ode5', 160)}
 

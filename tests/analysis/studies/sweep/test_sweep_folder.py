@@ -136,10 +136,18 @@ CHANGED = {  # file, old, new -> key that the line names
 }
 
 
-@pytest.mark.parametrize(('file', 'old', 'new'), CHANGED)
-def test_folder_of_another_campaign_is_refused(file: str, old: str, new: str, files: Path) -> None:
+@pytest.fixture(scope='module')
+def begun(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A campaign and its sweep after one block."""
+    folder = write_files(tmp_path_factory.mktemp('begun'))
     with pytest.raises(SweepStoppedError):
-        run(files, Interrupted(after=1))
+        run(folder, Interrupted(after=1))
+    return folder
+
+
+@pytest.mark.parametrize(('file', 'old', 'new'), CHANGED)
+def test_folder_of_another_campaign_is_refused(file, old, new, begun: Path, tmp_path: Path) -> None:
+    files = shutil.copytree(begun, tmp_path / 'files')
     before = parts(files / 'out')
     text = (files / file).read_text()
     assert old in text
@@ -150,7 +158,9 @@ def test_folder_of_another_campaign_is_refused(file: str, old: str, new: str, fi
     assert len(str(refused.value).splitlines()) == 1
     assert parts(files / 'out') == before
     (files / file).write_text(text + '# a comment changes nothing\n')
-    assert run(files).rollouts == ROLLOUTS
+    campaign = load_campaign(files / 'campaign.yaml')
+    with sweep_folder(files / 'out', campaign, overwrite=False) as folder:
+        assert not folder.new
 
 
 def test_folder_is_refused_when_the_vehicle_has_changed(files: Path) -> None:

@@ -1,6 +1,7 @@
 """Sweeps with words, lists and failures, broken and unfinished ones, and their reports."""
 
 import json
+import shutil
 from pathlib import Path
 from types import SimpleNamespace as Made
 
@@ -30,6 +31,12 @@ from auv_analysis.studies.sweep.plots import draw
 from auv_dynamics.files.errors import InputError
 
 
+@pytest.fixture(scope='module')
+def two(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sweep of which two parts are there."""
+    return make_sweep(tmp_path_factory.mktemp('two'), SIMPLE, simple, range(2))
+
+
 def test_words_lists_and_failures(tmp_path: Path) -> None:
     results = analysed(open_sweep(make_sweep(tmp_path, MIXED, mixed)))
     assert {v.path: list(v.labels) for v in results.factors} == {
@@ -53,12 +60,12 @@ def test_words_lists_and_failures(tmp_path: Path) -> None:
 
 
 def test_a_sweep_that_is_not_finished_is_analysed(tmp_path: Path) -> None:
-    sweep = open_sweep(make_sweep(tmp_path, SIMPLE, simple, range(0, 16, 3)))
-    assert (sweep.rows, sweep.planned) == (600, 1600)
+    sweep = open_sweep(make_sweep(tmp_path, SIMPLE, simple, range(0, 4, 3)))
+    assert (sweep.rows, sweep.planned) == (800, 1600)
     results = analysed(sweep)
-    assert results.counts()[0]['rows'] == 300
+    assert results.counts()[0]['rows'] == 400
     (row,) = rows(results, 'paired', figure=ENERGY)
-    assert row['rollouts'] == 300
+    assert row['rollouts'] == 400
 
 
 def test_bins_are_joined_where_they_are_many(results: Analysis) -> None:
@@ -96,16 +103,16 @@ def test_bins_are_joined_where_they_are_many(results: Analysis) -> None:
         (lambda out: (out / 'rollouts').rename(out / 'gone'), 'expected the rows of a sweep'),
     ],
 )  # fmt: skip
-def test_a_broken_sweep_is_refused_in_one_line(tmp_path: Path, spoil, words: str) -> None:
-    out = make_sweep(tmp_path, SIMPLE, simple, range(3))
+def test_a_broken_sweep_is_refused_in_one_line(two: Path, tmp_path, spoil, words: str) -> None:
+    out = shutil.copytree(two, tmp_path / 'out')
     spoil(out)
     with pytest.raises(InputError, match=words) as refusal:
         analysed(open_sweep(out))
     assert '\n' not in str(refusal.value)
 
 
-def test_a_part_that_has_changed_is_said(tmp_path: Path) -> None:
-    out = make_sweep(tmp_path, SIMPLE, simple, range(3))
+def test_a_part_that_has_changed_is_said(two: Path, tmp_path: Path) -> None:
+    out = shutil.copytree(two, tmp_path / 'out')
     assert analysed(open_sweep(out)).notes == []
     parquet.write_table(parquet.read_table(_part(out)), _part(out))
     (note,) = analysed(open_sweep(out)).notes
@@ -169,11 +176,11 @@ def test_every_number_of_the_report_is_in_a_file(tmp_path: Path, campaign, known
 @pytest.mark.usefixtures('undrawn')
 def test_an_unfinished_sweep_says_so(tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
-    out = make_sweep(tmp_path, SIMPLE, simple, range(0, 16, 3))
+    out = make_sweep(tmp_path, SIMPLE, simple, range(0, 4, 3))
     cli.main(['analyze', str(out)])
-    assert 'note: not finished, 600 of 1600 rows are there' in capsys.readouterr().err
+    assert 'note: not finished, 800 of 1600 rows are there' in capsys.readouterr().err
     report = (tmp_path / 'runs/analyze_simple/report.html').read_text(encoding='utf-8')
-    assert 'The sweep is not finished: 600 of 1600 rows are there.' in report
+    assert 'The sweep is not finished: 800 of 1600 rows are there.' in report
 
 
 @pytest.mark.usefixtures('undrawn')
@@ -188,11 +195,11 @@ def test_a_sweep_without_figures_is_a_failure(tmp_path: Path, capsys) -> None:
     def refused(controller, values, index):
         return {'status': np.full(len(index), 'refused', object)}
 
-    out = make_sweep(tmp_path, SIMPLE, refused, range(2))
+    out = make_sweep(tmp_path, SIMPLE, refused, range(1))
     with pytest.raises(SystemExit) as end:
         cli.main(['analyze', str(out), '--out', str(tmp_path / 'report')])
     assert end.value.code == 1
-    assert capsys.readouterr().err.splitlines()[-1] == f'{out}: none of 200 rows has figures'
+    assert capsys.readouterr().err.splitlines()[-1] == f'{out}: none of 400 rows has figures'
     assert not (tmp_path / 'report').exists()
 
 
@@ -247,6 +254,7 @@ def test_paths_of_many_lists_have_no_table_of_two(tmp_path: Path) -> None:
     assert (results.pair, results.tables['together']) == ([], [])
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_few_rows_still_show_what_they_depend_on(tmp_path: Path) -> None:
     text = 'name: few\nscenario: case1\nvary: [{grid: {controllers.*.k_D: [1, 2, 3]}}]'
 

@@ -48,7 +48,7 @@ def pair(law, hold, vehicle, **changes):
     """(ours, theirs) of one controller of case1 with some of its entries replaced."""
     base = case(changes.pop('base', 'case1'))
     values = changes.pop('gains', None)
-    data = base.data | {'duration': 0.5} | changes
+    data = base.data | {'duration': 0.3} | changes
     if values is not None:
         data['controllers'] = {law: values | {'law': law}}
     scenario = replace(base, vehicle=vehicle_from_dict(vehicle, 'vehicle.yaml'), data=data)

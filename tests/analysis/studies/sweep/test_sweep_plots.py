@@ -49,9 +49,16 @@ def known(controller, values, index):
     return made | {f'velocity_error.settling_time.{dof}': late for dof in ('surge', 'heave')}
 
 
-def drawn_of(folder: Path, campaign: str, figures) -> Drawn:
+def drawn_of(folder: Path, campaign: str, figures, only: str | None = None) -> Drawn:
+    """All plots of a campaign, or one of those that there are."""
     analysis = analysed(open_sweep(make_sweep(folder, campaign, figures)))
-    with artists.captured() as found:
+    save = plots.plots.save_figures
+
+    def save_one(out: Path, drawn):
+        return save(out, drawn if only is None else {only: drawn[only]})
+
+    with artists.captured() as found, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plots.plots, 'save_figures', save_one)
         records = draw(analysis, folder / 'figures')
     return analysis, found, {name: record.caption for name, record in records.items()}
 
@@ -285,7 +292,7 @@ def test_failures_are_the_shares_of_their_rows(failing: Drawn) -> None:
 
 
 def test_elementary_effects_stand_at_their_places(tmp_path: Path) -> None:
-    analysis, figures, _ = drawn_of(tmp_path, MORRIS, known)
+    analysis, figures, _ = drawn_of(tmp_path, MORRIS, known, 'elementary_effects')
     figure = figures['elementary_effects']
     assert figure.get_supxlabel().startswith(r'$\mu^*$')
     assert figure.get_supylabel().startswith(r'$\sigma$')
@@ -320,7 +327,7 @@ def test_elementary_effects_stand_at_their_places(tmp_path: Path) -> None:
 
 
 def test_total_indices_stand_in_their_cells(tmp_path: Path) -> None:
-    analysis, figures, captions = drawn_of(tmp_path, SALTELLI, known)
+    analysis, figures, captions = drawn_of(tmp_path, SALTELLI, known, 'total_indices')
     maps = heat_maps(figures['total_indices'])
     assert list(maps) == ['(a) $S_T$', '(b) $S_T$']
     assert '(a) gvc; (b) cl' in captions['total_indices']

@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -49,8 +50,11 @@ def _runs(name: str) -> dict[str, Run]:
     return {controller: simulate(scenario, controller) for controller in scenario.controllers}
 
 
+_summary = cache(summarize)  # most tests change one run of two
+
+
 def _table(runs: dict[str, Run]) -> dict:
-    claims = judge_runs(runs, {name: summarize(run) for name, run in runs.items()})
+    claims = judge_runs(runs, {name: _summary(run) for name, run in runs.items()})
     return {claim.number: claim for claim in claims}
 
 

@@ -47,7 +47,7 @@ def few(case, law, hold='continuous', threads=2):
     """Sensitivity of few samples; that of the same loops is made once."""
     key = json.dumps([case.data, case.vehicle_data, law, hold], sort_keys=True)
     if key not in MADE:
-        MADE[key] = sensitivity(case, law, count=64, hold=hold, threads=threads)
+        MADE[key] = sensitivity(case, law, count=16, hold=hold, threads=threads)
     return MADE[key]
 
 

@@ -84,7 +84,7 @@ def test_command_writes_table_and_report(tmp_path: Path, capsys, approved) -> No
     assert 'sway–yaw, heave–pitch' in report, 'what damping couples'
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_every_number_of_the_report_is_in_the_document(tmp_path: Path) -> None:
     main.main(['atlas', 'herman2018', '--only', '--out', str(tmp_path / 'out')])
     assert check_numbers(tmp_path / 'out') > 20

@@ -161,7 +161,7 @@ def test_lines_are_told_apart() -> None:
 @pytest.mark.parametrize('copies', [1, 5])
 def test_figures_scale_with_the_number_of_runs(entries, copies: int, tmp_path: Path) -> None:
     many = [replace(e, name=f'{e.name}_{i}', controller=f'{e.controller}_{i}')
-            for i in range(copies) for e in entries]  # fmt: skip
+            for i in range(copies) for e in (*entries[:2], entries[-1])]  # fmt: skip
     table = comparison_table(many)
     drawn = plots.draw(many, table, rank(table), tmp_path / 'figures')
     assert set(drawn) == {'ranking', 'errors', 'kinetic_energy'}

@@ -31,7 +31,7 @@ def scenarios(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return [f'{name}.yaml' for name in names]
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_command_compares_scenarios_by_name(scenarios, capsys) -> None:
     main.main(['analyze', *scenarios, '--json'])
     captured = capsys.readouterr()

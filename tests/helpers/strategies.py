@@ -1,6 +1,10 @@
-"""Hypothesis strategies of physical vehicles, states and gains, as the files give them."""
+"""Hypothesis strategies of physical vehicles, states and gains, as the files give them.
+
+Each is made once: to make one anew, and to see that it is valid, takes as long as to draw from it.
+"""
 
 import os
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -20,12 +24,14 @@ def examples(count: int, **options: Any) -> settings:
 QUICK = examples(10)
 
 
+@cache
 def vectors(n: int = 6, largest: float = 3.0) -> st.SearchStrategy[np.ndarray]:
     """(n,) finite numbers within +-largest."""
     elements = st.floats(-largest, largest, allow_subnormal=False)
     return arrays(float, n, elements=elements, fill=st.nothing())  # each entry its own
 
 
+@cache
 def _dense(n: int, largest: float) -> st.SearchStrategy[np.ndarray]:
     """(n, n) numbers within +-largest, zeros and +-largest among them, all by one draw.
 
@@ -40,6 +46,7 @@ def _dense(n: int, largest: float) -> st.SearchStrategy[np.ndarray]:
     return st.integers(0, 2**32 - 1).map(entries)
 
 
+@cache
 def attitudes(pitch: float = 1.3) -> st.SearchStrategy[np.ndarray]:
     """(6,) eta with theta within +-pitch."""
     parts = (st.floats(-50, 50), st.floats(-50, 50), st.floats(-50, 50))
@@ -47,12 +54,14 @@ def attitudes(pitch: float = 1.3) -> st.SearchStrategy[np.ndarray]:
     return st.tuples(*parts, *angles).map(np.array)
 
 
+@cache
 def _signed(smallest: float, largest: float) -> st.SearchStrategy[float]:
     return st.builds(
         lambda size, sign: size * sign, st.floats(smallest, largest), st.sampled_from((-1.0, 1.0))
     )
 
 
+@cache
 @st.composite
 def positive_definite(draw: st.DrawFn, n: int = 6) -> np.ndarray:
     """(n, n) dense, symmetric, eigenvalues from 0.1 to a few."""
@@ -119,16 +128,18 @@ def vehicles(draw: st.DrawFn, heavy_water: bool | None = None) -> dict[str, Any]
     }
 
 
+_scalar = st.floats(0.1, 2.0)
+FORMS = st.one_of(_scalar, st.lists(_scalar, min_size=6, max_size=6), positive_definite())
+
+
+@cache
 @st.composite
 def gains(draw: st.DrawFn) -> dict[str, Any]:
     """k_D, k_I, Lambda, Gamma: each a number, six numbers or a symmetric 6x6 matrix."""
     sizes = {'k_D': 10.0, 'k_I': 1.0, 'Lambda': 1.0, 'Gamma': 50.0}
     one = {}
     for name, size in sizes.items():
-        scalar = st.floats(0.1, 2.0)
-        form = draw(
-            st.one_of(scalar, st.lists(scalar, min_size=6, max_size=6), positive_definite())
-        )
+        form = draw(FORMS)
         one[name] = (size * np.asarray(form)).tolist()
     return one
 

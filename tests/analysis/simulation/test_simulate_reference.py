@@ -66,7 +66,7 @@ def test_random_vehicles_and_gains(law, hold, vehicle, values):
     if law == 'cl':  # as strong as the same gains are in GVC
         values = values | {key: (mass * np.array(values[key])).tolist() for key in ('k_D', 'Gamma')}
     push = {'kind': 'harmonic', 'sway': wave(0.3 * mass, 0.5 * mass, 0.8)}
-    changes = {'setpoint': SIX, 'disturbance': [push], 'duration': 0.1, 'step': 0.001}
+    changes = {'setpoint': SIX, 'disturbance': [push], 'duration': 0.05, 'step': 0.001}
     check(*pair(law, hold, vehicle, gains=values, **changes))
 
 

@@ -192,7 +192,7 @@ def test_random_uncertain_vehicles(vehicle, errors, flow):
         {'kind': 'current', 'velocity': flow.tolist()},
         {'kind': 'harmonic', 'sway': wave(0.3 * mass, 0.5 * mass, 0.8)},
     ]
-    changes = {'setpoint': SIX, 'disturbance': specs, 'duration': 0.1, 'step': 0.001}
+    changes = {'setpoint': SIX, 'disturbance': specs, 'duration': 0.05, 'step': 0.001}
     for hold in ('continuous', 'zoh'):
         compare(*pair('gvc', hold, vehicle, **changes))
 

@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 
+import psutil
 import pytest
 from helpers.sweeps import CAMPAIGN, ROLLOUTS, parts, rows, run, write_files
 
@@ -140,6 +141,20 @@ def test_command_starts_dask_on_this_machine(processes, files: Path, monkeypatch
     main(['sweep', 'campaign.yaml', '--executor', 'dask', '--workers', '1', '--out', 'local'])
     main(['sweep', 'campaign.yaml', '--out', 'threads'])
     assert rows(files / 'local').equals(rows(files / 'threads'))
+
+
+def test_dask_listens_on_the_loopback_interface_alone(monkeypatch) -> None:
+    import distributed
+
+    def listening() -> set[tuple[str, int]]:
+        found = psutil.Process().net_connections('inet')
+        return {one.laddr for one in found if one.status == psutil.CONN_LISTEN}
+
+    cluster = partial(distributed.LocalCluster, processes=False)
+    monkeypatch.setattr(distributed, 'LocalCluster', cluster)
+    before = listening()
+    with opened('dask', None, 1):
+        assert {address for address, _ in listening() - before} == {'127.0.0.1'}
 
 
 def test_scheduler_that_does_not_answer_is_refused(monkeypatch) -> None:

@@ -288,6 +288,7 @@ def _why(error: Exception) -> str | None:
     return None
 
 
+LOOPBACK = '127.0.0.1:0'  # of the HTTP servers of dask
 AHEAD = 2  # blocks handed over for each worker: one runs, one waits
 PATIENCE = 30.0  # s for a scheduler and its first worker
 
@@ -338,7 +339,13 @@ def _dask(scheduler: str | None, count: int) -> Iterator[Opened]:
         address: object = scheduler
         if scheduler is None:
             address = stack.enter_context(
-                distributed.LocalCluster(count, threads_per_worker=1, dashboard_address=None)
+                distributed.LocalCluster(
+                    count,
+                    threads_per_worker=1,
+                    dashboard_address=LOOPBACK,  # None: port 8787 of every network
+                    worker_dashboard_address=LOOPBACK,
+                    scheduler_kwargs={'dashboard': False},
+                )
             )
         try:
             client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)

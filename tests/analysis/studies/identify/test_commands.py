@@ -61,6 +61,12 @@ def short(tmp_path_factory):
 
 
 @pytest.fixture(scope='module')
+def brief(tmp_path_factory):
+    """Another one of three seconds."""
+    return recording(tmp_path_factory.mktemp('brief'), 3.0)
+
+
+@pytest.fixture(scope='module')
 def identified(bag, tmp_path_factory, composing):
     out = tmp_path_factory.mktemp('found') / 'identified'
     with composing():
@@ -106,20 +112,20 @@ def test_a_bag_becomes_a_vehicle_file(identified):
     assert 'residuals are white' in document['residuals']
 
 
-def test_a_bag_of_its_own_is_held_out(short, bag):
-    given = ['identify', str(short), str(short), '--vehicle', 'herman2018', '--holdout', str(bag)]
+def test_a_bag_of_its_own_is_held_out(short, brief):
+    given = ['identify', str(short), str(short), '--vehicle', 'herman2018', '--holdout', str(brief)]
     with pytest.raises(InputError, match='--holdout: expected a bag that nothing is learned from'):
         identify_command.read(parser().parse_args([*given[:-1], str(short)]), 'identify')
     trial = identify_command.read(parser().parse_args(given), 'identify')
-    assert [round(one.end) for one in (*trial.training, *trial.held)] == [6, 60]
-    assert trial.inputs == [short, short, bag, shipped('vehicles', 'herman2018')]
+    assert [round(one.end) for one in (*trial.training, *trial.held)] == [6, 3]
+    assert trial.inputs == [short, short, brief, shipped('vehicles', 'herman2018')]
     assert trial.out == Path('runs/identify_herman2018')
 
 
 @pytest.mark.usefixtures('unrendered')
 def test_intervals_on_request_stand_beside_the_others(bag, tmp_path, approved, capsys):
     out = tmp_path / 'asked'
-    fewer = ('--part', '0:30', '--fixed', 'M', '--fixed', 'D_quadratic')
+    fewer = ('--part', '0:20', '--fixed', 'M', '--fixed', 'D_quadratic')
     asked = ('--bootstrap', 40, '--profile', 'lag')
     given = ('identify', bag, '--vehicle', 'herman2018', '--out', out)
     main([str(argument) for argument in (*given, *fewer, *asked)])
@@ -166,7 +172,8 @@ def test_a_prediction_is_one_document_where_it_is_asked_for(short, tmp_path, mon
 
 
 @pytest.mark.usefixtures('undrawn')
-def test_a_recording_that_contradicts_the_prior_gives_no_file(bag, tmp_path, monkeypatch, capsys):
+def test_a_recording_that_contradicts_the_prior_gives_no_file(tmp_path, monkeypatch, capsys):
+    bag = recording(tmp_path, 10.0)
     out, found, prior = tmp_path / 'other', [], tmp_path / 'prior.yaml'
     prior.write_bytes(shipped('vehicles', 'rexrov').read_bytes())
 
@@ -330,7 +337,9 @@ def test_a_part_may_have_one_end():
     assert identify_command._span(':30') == (0.0, 30.0)
 
 
-def test_what_the_command_line_asks_for_is_what_is_done(short, tmp_path, monkeypatch, capsys):
+def test_what_the_command_line_asks_for_is_what_is_done(
+    short, brief, tmp_path, monkeypatch, capsys
+):
     asked, kept, before = [], [], []
 
     def folder(*given, inputs, **options):
@@ -365,8 +374,7 @@ def test_what_the_command_line_asks_for_is_what_is_done(short, tmp_path, monkeyp
     assert (other.fixed, other.observer) == (['lag', 'delay'], None)
     believed = tmp_path / 'prior.yaml'
     believed.write_text('M.surge.surge: {value: 280, deviation: 5}')
-    apart = recording(tmp_path / 'apart', 3.0)
-    given = (*given[:-1], apart, '--prior', believed)
+    given = (*given[:-1], brief, '--prior', believed)
     assert auv(capsys, 'identify', *given)[0] == 1
     learnt, held, _, known, _ = asked[-1]
     assert held[-1].end < 3.5 < learnt[-1].end

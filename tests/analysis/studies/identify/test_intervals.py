@@ -42,8 +42,8 @@ def known(found):
 
 @pytest.fixture(scope='module')
 def quiet(tmp_path_factory):
-    record, _ = trial(tmp_path_factory.mktemp('quiet'), 'herman2018', 3, duration=60.0)
-    return identified(record, free=FREE, bootstrap=60, profile=('lag', 'auto', 'M.surge.surge'))
+    record, _ = trial(tmp_path_factory.mktemp('quiet'), 'herman2018', 3, duration=40.0)
+    return identified(record, free=FREE, bootstrap=40, profile=('lag', 'auto', 'M.surge.surge'))
 
 
 @pytest.fixture(scope='module')
@@ -61,7 +61,7 @@ def test_a_bootstrap_over_blocks_is_as_wide_as_the_sandwich(quiet):
     ]  # fmt: skip
     assert len(width) >= 10
     assert 0.7 < np.median(width) < 1.3
-    assert quiet.resampled.shape == (60, len(quiet.fit.theta))
+    assert quiet.resampled.shape == (40, len(quiet.fit.theta))
     middle = np.median(quiet.resampled, axis=0) - quiet.fit.theta
     assert np.all(np.abs(middle) < np.sqrt(np.diag(quiet.covariance)))
 

@@ -51,6 +51,12 @@ def command(tmp_path: Path, monkeypatch, capsys) -> Callable:
     return call
 
 
+@pytest.fixture
+def brief(monkeypatch) -> None:
+    """A search that ends at the first of its optima, where nobody asks for the best one."""
+    monkeypatch.setattr(searching, 'FINALISTS', 1)
+
+
 @pytest.mark.usefixtures('unrendered')
 def test_folder_document_and_files_agree(command: Callable, tmp_path: Path, approved) -> None:
     code, out, lines = command(*QUICK, '--json')
@@ -179,7 +185,7 @@ def _perturbed(document: dict, folder: Path) -> None:
             assert row['smaller'] == pytest.approx((ratios < 1 - 1e-6).mean())
 
 
-@pytest.mark.usefixtures('undrawn')
+@pytest.mark.usefixtures('undrawn', 'brief')
 def test_search_check_and_draws_are_held_where_that_is_asked_for(command, tmp_path: Path) -> None:
     write(tmp_path, {'gvc': GVC}, duration=0.5, step=0.05)
     asked = '--law', 'gvc', '--structure', 'mass', '--samples', '10', '--hold', 'zoh'
@@ -209,7 +215,7 @@ def test_same_seed_same_document_another_seed_another(command: Callable) -> None
     assert first['monte_carlo']['controllers'] != other['monte_carlo']['controllers']
 
 
-@pytest.mark.usefixtures('undrawn')
+@pytest.mark.usefixtures('undrawn', 'brief')
 def test_equal_error_and_no_draws(command: Callable, tmp_path: Path) -> None:
     write(tmp_path, {'gvc': GVC, 'cl': SAME_CL}, duration=1.0)
     arguments = ('--equal', 'error', '--index', 'mean', '--samples', '0', '--out', 'mine')
@@ -224,7 +230,7 @@ def test_equal_error_and_no_draws(command: Callable, tmp_path: Path) -> None:
     assert not (tmp_path / 'runs').exists()
 
 
-@pytest.mark.usefixtures('undrawn')
+@pytest.mark.usefixtures('undrawn', 'brief')
 def test_scenario_without_gvc_needs_a_reference(command: Callable, tmp_path: Path) -> None:
     write(tmp_path, {'cl': SAME_CL}, duration=0.5)
     code, _, lines = command(*QUICK)
@@ -295,7 +301,7 @@ def test_actuators_need_sampling(command: Callable, tmp_path: Path) -> None:
     assert 'actuators: expected hold' in lines[0]
 
 
-@pytest.mark.usefixtures('undrawn')
+@pytest.mark.usefixtures('undrawn', 'brief')
 def test_names_that_are_taken_stay_what_they_are(command: Callable, tmp_path: Path) -> None:
     write(tmp_path, {'gvc': GVC, 'cl_tuned': SAME_CL}, duration=0.3)
     code, out, _ = command(*QUICK, '--samples', '0', '--json')

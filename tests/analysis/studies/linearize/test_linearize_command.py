@@ -12,7 +12,7 @@ from auv_analysis.cli.main import main
 from auv_analysis.studies.linearize.modes import stability
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_a_vehicle_alone(tmp_path, capsys):
     out = tmp_path / 'out'
     point = ['--nu0', '0.5', '0', '0', '0', '0', '-0.1', '--attitude', '0.1', '-0.2', '0']
@@ -47,11 +47,14 @@ def test_the_loops_of_a_scenario_as_a_table(tmp_path, monkeypatch, capsys, appro
     assert f'cl: 20 states, marginal, 2 of its {len(model["modes"])} modes neither grow' in text
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_all_models_are_of_one_point(tmp_path, capsys):
+    late = {'vehicle': 'herman2018', 'actuators': {'delay': 2.0}}  # too late for any margins
+    (tmp_path / 'late.yaml').write_text(yaml.safe_dump(load_scenario('case1').data | late))
     nu0, attitude = ['0.5', '0.1', '-0.2', '0.01', '0.02', '0.03'], ['0.1', '-0.2', '0.3']
     point = ['--nu0', *nu0, '--attitude', *attitude, '--out', str(tmp_path / 'out'), '--json']
-    main(['linearize', 'case1', '--controller', 'cl', '--controller', 'gvc', *point])
+    both = ['--controller', 'cl', '--controller', 'gvc']
+    main(['linearize', str(tmp_path / 'late.yaml'), *both, *point])
     models = json.loads(capsys.readouterr().out)['models']
     assert list(models) == ['open loop', 'cl', 'gvc']
     for model in models.values():
@@ -85,7 +88,7 @@ def test_refusals_are_one_line(line, name, tmp_path, monkeypatch, capsys):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_a_controller_without_feedback_has_no_closed_loop(tmp_path, capsys):
     """What `auv excite` writes: its wrench holds no velocity, and the vehicle alone is left."""
     data = load_scenario('case1_bluerov2_heavy').data | {

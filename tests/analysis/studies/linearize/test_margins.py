@@ -389,7 +389,7 @@ def test_a_simulation_with_rotors_that_swing_dies_out_below_the_gain_margin(tmp_
     assert min(left(1.02 * heave)) > 1.0
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_a_delay_of_many_steps_leaves_the_poles(tmp_path, capsys):
     data = scenario_of(step=0.01, actuators={'delay': 2.0, 'lag': 3.0}).data
     path = tmp_path / 'late.yaml'

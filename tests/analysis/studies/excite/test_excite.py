@@ -193,7 +193,7 @@ def test_the_report_has_its_numbers_where_their_heads_say(
     )
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_the_command_writes_what_was_found(excited, tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.setattr(searching, 'excite', lambda *_: excited)
     monkeypatch.chdir(tmp_path)
@@ -621,7 +621,7 @@ def test_nothing_that_is_free_is_refused() -> None:
         excite(request_of(free=()))
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_what_cannot_be_told_apart_is_said_in_whole_sentences(excited, tmp_path: Path) -> None:
     results = results_of(excited)
     results.facts['combinations'] = [{'words': 'mass and M.surge.surge stand for one another'}]

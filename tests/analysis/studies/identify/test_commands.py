@@ -141,6 +141,7 @@ def test_intervals_on_request_stand_beside_the_others(bag, tmp_path, approved, c
     approved.add(printed.out.splitlines())
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_the_file_predicts_the_recording(bag, identified, tmp_path, monkeypatch, capsys):
     read = predict_command.read
     monkeypatch.setattr(predict_command, 'read', lambda *a: read(*a)._replace(notes=['odd']))
@@ -159,7 +160,7 @@ def test_the_file_predicts_the_recording(bag, identified, tmp_path, monkeypatch,
     assert (tmp_path / 'p' / 'figures' / 'prediction.png').exists()
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_a_prediction_is_one_document_where_it_is_asked_for(short, tmp_path, monkeypatch, capsys):
     numbers = ('error', 'linear', 'angular', 'ratio', 'ratio_low', 'ratio_high')
     rows = [{'predictor': name, 'horizon': 0.5, **dict.fromkeys(numbers, 0.5)}
@@ -403,7 +404,7 @@ def test_a_prior_file_needs_values_and_deviations(entry, line, short, tmp_path, 
     assert said.count('\n') == 1
 
 
-@pytest.mark.usefixtures('unrendered')
+@pytest.mark.usefixtures('undrawn')
 def test_rotations_alone_tell_the_rotational_block(bag, tmp_path):
     """An Imu's log: what linear motion would tell stays open, or has an interval with the truth."""
     told = {'odometry': '/odom', 'wrench': '/wrench', 'unknown': ['x', 'y', 'z', 'u', 'v', 'w']}

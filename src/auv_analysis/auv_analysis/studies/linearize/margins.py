@@ -188,6 +188,7 @@ class ControlLoop:
     eta0: Sequence[float] | np.ndarray | None = None
     plant: HeldPlant = field(init=False)
     turning: bool = field(init=False)
+    _known: dict[bytes, np.ndarray] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check the times, and sample the plant."""
@@ -226,11 +227,6 @@ class ControlLoop:
     def omega(self) -> np.ndarray:
         """(n,) rad/s of the grid, up to half the sampling frequency."""
         return np.geomspace(SLOWEST, 1.0, POINTS) * np.pi / self.plant.period
-
-    @cached_property
-    def _seen(self) -> np.ndarray:
-        z = np.exp(1j * self.omega * self.plant.period)
-        return self.plant.response(z, self._held)
 
     @cached_property
     def _held(self) -> HeldInput:
@@ -275,8 +271,17 @@ class ControlLoop:
         near = np.clip(near.ravel() / self.plant.period, self.omega[0], self.omega[-2])
         omega = np.concatenate([self.omega, near])
         order = np.argsort(omega)
-        S = np.concatenate([loop.sensitivity(self.omega, self._seen), loop.sensitivity(near)])
+        known = self._reached(loop)
+        S = np.concatenate([loop.sensitivity(self.omega, known), loop.sensitivity(near)])
         return omega[order], S[order]
+
+    def _reached(self, loop: SampledLoop) -> np.ndarray:
+        """`reached` on the grid; a gain that is scaled seldom changes rates of the law's states."""
+        rates = np.hstack([loop.law.rate_by_x, loop.law.rate_by_state]).tobytes()
+        if rates not in self._known:
+            self._known.clear()
+            self._known[rates] = loop.reached(self.omega)
+        return self._known[rates]
 
     def margins(self, loop: SampledLoop, *, delays: bool = True) -> tuple[AxisMargins, ...]:
         """Margins of the six axes; `delays`: with the delay margins, which take longest."""

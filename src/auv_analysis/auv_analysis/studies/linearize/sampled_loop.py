@@ -141,11 +141,16 @@ class LinearLaw(NamedTuple):
     rate_by_x: np.ndarray
     rate_by_state: np.ndarray
 
-    def response(self, z: np.ndarray, period: float) -> np.ndarray:
-        """(..., 6, 8) from what the law sees to tau."""
+    def reached(self, z: np.ndarray, period: float, seen: np.ndarray) -> np.ndarray:
+        """(..., 8 + m, 6) from u to what the law sees, `seen`, and to its states."""
         m = len(self.rate_by_x)
         moved = (np.asarray(z) - 1)[..., None, None] * np.eye(m) - period * self.rate_by_state
-        return self.by_x + self.by_state @ np.linalg.solve(moved, period * self.rate_by_x)
+        states = np.linalg.solve(moved, period * self.rate_by_x @ seen)
+        return np.concatenate([seen, states], axis=-2)
+
+    def closed(self, reached: np.ndarray) -> np.ndarray:
+        """I + L (..., 6, 6) where u reaches that."""
+        return np.eye(6) - np.hstack([self.by_x, self.by_state]) @ reached
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,17 +172,21 @@ class SampledLoop:
         """exp(i omega h) at rad/s."""
         return np.exp(1j * np.asarray(omega) * self.plant.period)
 
-    def sensitivity(self, omega: np.ndarray, plant: np.ndarray | None = None) -> np.ndarray:
+    def reached(self, omega: np.ndarray) -> np.ndarray:
+        """(..., 8 + m, 6) from u to what the law sees and to its states at omega (...,) rad/s."""
+        z = self.z(omega)
+        return self.law.reached(z, self.plant.period, self.plant.response(z, self.held))
+
+    def sensitivity(self, omega: np.ndarray, reached: np.ndarray | None = None) -> np.ndarray:
         """S = (I + L)^-1 (..., 6, 6) at omega (...,) rad/s; tau = -L u where the loop is open.
 
-        `plant` is the plant's response there where it is known. With the loop opened at axis i
-        alone, the others closed, its gain is 1/S_ii - 1.
+        `reached` is that there where it is known. With the loop opened at axis i alone, the others
+        closed, its gain is 1/S_ii - 1.
 
         Skogestad & Postlethwaite 2005, section 2.2.
         """
-        z = self.z(omega)
-        seen = self.plant.response(z, self.held) if plant is None else plant
-        return np.linalg.inv(np.eye(6) - self.law.response(z, self.plant.period) @ seen)
+        known = self.reached(omega) if reached is None else reached
+        return np.linalg.inv(self.law.closed(known))
 
     def closing(self, omega: float, axis: int, extra: float) -> complex:
         """1 + the loop gain of an axis whose wrench comes `extra` s later still."""
@@ -185,7 +194,7 @@ class SampledLoop:
         seen = self.plant.response(z, self.held)
         late = self.plant.input(self.held.delay + extra)
         seen[:, axis] = self.plant.response(z, late)[:, axis]
-        whole = np.eye(6) - self.law.response(z, self.plant.period) @ seen
+        whole = self.law.closed(self.law.reached(z, self.plant.period, seen))
         others = np.delete(np.delete(whole, axis, 0), axis, 1)
         return complex(np.linalg.det(whole) / np.linalg.det(others))
 

@@ -171,6 +171,7 @@ STEPPED = {'surge': {'offset': 1.0}}
 def test_of_an_integrator_no_law_beats_proportional_feedback(tmp_path, monkeypatch, law) -> None:
     """LQR: m u_dot = tau with cost e^2 + r tau^2 has tau = k e, so that nothing beats k = 6 m."""
     monkeypatch.setattr(searching, 'POINTS', 128)
+    monkeypatch.setattr(searching, 'STARTS', 4)
     alone = {'law': 'gvc', 'k_D': 6.0, 'k_I': 1e-9, 'Lambda': 1e-9, 'Gamma': 1e-9}
     base = scenario(
         tmp_path,
@@ -197,6 +198,7 @@ def test_of_an_integrator_no_law_beats_proportional_feedback(tmp_path, monkeypat
 
 def test_on_multiples_of_M_gvc_and_cl_are_one_law(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(searching, 'POINTS', 64)
+    monkeypatch.setattr(searching, 'STARTS', 4)
     base = scenario(tmp_path, {'gvc': GVC}, vehicle='rexrov', duration=0.5)
     request = Request(
         base, 'gvc', ('gvc', 'cl'), 'effort', 'weighted_error', 1e-3, 'inertia', 'continuous', 0, 1

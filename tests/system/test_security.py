@@ -23,7 +23,7 @@ from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.security import PROFILES, RANGE, asked, loopback, require, stay_local
 
 TESTS = str(Path(__file__).resolve().parents[1])
-PLANT = ('--ros-args', '-p', 'vehicle:=herman2018')
+NODE = 'frame_converter_node'  # of all nodes it loads least
 ENFORCED = {'ROS_SECURITY_ENABLE': 'true', 'ROS_SECURITY_STRATEGY': 'Enforce'}
 DDS_PORTS = range(7000, 32768)  # above them are those that the system hands out for sending
 
@@ -42,15 +42,15 @@ def bare(**extra: str) -> dict[str, str]:
 
 
 @contextmanager
-def plant(environ: dict[str, str], *before: str) -> Iterator[subprocess.Popen | Process]:
-    """A plant node; behind another command, the installed one."""
+def node(environ: dict[str, str], *before: str) -> Iterator[subprocess.Popen | Process]:
+    """A node; behind another command, the installed one."""
     if before:
-        command = [*before, str(executable('auv_dynamics', 'plant_node')), *PLANT]
+        command = [*before, str(executable('auv_dynamics', NODE))]
         process = subprocess.Popen(
             command, env=environ, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         )
     else:
-        process = fork_server().start(['plant_node', *PLANT], environ)
+        process = fork_server().start([NODE], environ)
     try:
         yield process
     finally:
@@ -122,10 +122,10 @@ def test_auv_never_runs_without_the_security_that_is_enforced(
 def test_a_node_never_runs_without_the_security_that_is_enforced(tmp_path, keys) -> None:
     environ = bare(**ENFORCED)
     if keys:
-        (tmp_path / 'enclaves/auv_gvc/plant_node').mkdir(parents=True)
+        (tmp_path / 'enclaves/auv_gvc' / NODE).mkdir(parents=True)
         environ['ROS_SECURITY_KEYSTORE'] = str(tmp_path)
-    command = [str(executable('auv_dynamics', 'plant_node')), *PLANT]
-    command += ['--enclave', '/auv_gvc/plant_node']
+    command = [str(executable('auv_dynamics', NODE)), '--ros-args']
+    command += ['--enclave', f'/auv_gvc/{NODE}']
     ended = subprocess.run(
         command, env=environ, capture_output=True, text=True, timeout=PATIENCE, check=False
     )
@@ -136,12 +136,12 @@ def test_a_node_never_runs_without_the_security_that_is_enforced(tmp_path, keys)
 
 @pytest.mark.parametrize('chosen', [{}, {RANGE: 'SUBNET'}])
 def test_a_node_that_a_user_starts_is_heard_as_far_as_ros_lets_it(chosen) -> None:
-    with plant(bare(**chosen), *(() if chosen else ('env',))) as process:
+    with node(bare(**chosen), *(() if chosen else ('env',))) as process:
         assert '0.0.0.0' in listening(process)
 
 
 def test_in_the_environment_of_auv_run_a_node_listens_on_the_loopback_alone() -> None:
-    with plant({**bare(), **loopback()}) as process:
+    with node({**bare(), **loopback()}) as process:
         assert listening(process) == {'127.0.0.1'}
 
 
@@ -190,13 +190,13 @@ def test_nothing_leaves_the_machine_and_nobody_outside_gets_in() -> None:
         environ = {**bare(), **loopback()}
         opened = bare(ROS_DOMAIN_ID=environ['ROS_DOMAIN_ID'], **{RANGE: 'SUBNET'})
         knows = {**opened, 'ROS_STATIC_PEERS': networks.INSIDE}
-        with plant(environ, *inside.command()):
-            assert found(inside, environ) == 'plant_node'
+        with node(environ, *inside.command()):
+            assert found(inside, environ) == NODE
             assert inside.sent() == 0
             assert found(outside, knows, patience(3.0)) == ''
         before = inside.sent()
-        with plant(opened, *inside.command()):
-            assert found(outside, knows) == 'plant_node'
+        with node(opened, *inside.command()):
+            assert found(outside, knows) == NODE
             assert inside.sent() > before
 
 

@@ -17,7 +17,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from runpy import run_path
@@ -42,6 +42,7 @@ NODES = {  # and the module of each
 }
 STARTERS = {'auv': 'auv_analysis.cli.main', 'record': 'helpers.graph_runs'}  # of nodes
 MODULES = {**NODES, **STARTERS}
+PLAIN = 'setpoint_node', 'recorder_node', 'replay_node', 'frame_converter_node'  # without kernels
 LOADED = (  # what `auv` imports once it knows what it has to do
     *('auv_analysis.cli.scenario_runs', 'auv_analysis.graph.recorded_runs'),
     *('auv_analysis.studies.compare.sources', 'auv_analysis.output.keyboard'),
@@ -228,9 +229,17 @@ def fork(
         os._exit(code)
 
 
+@cache
+def load_kernels() -> None:
+    """Load what plants and controllers call most."""
+    warm_up(load_scenario('case1'), ['gvc'])
+
+
 def program(arguments: Sequence[str]) -> Callable[[], Any]:
     """What runs a program, which is imported before the first fork that needs it."""
     name = Path(arguments[0]).name
+    if name not in PLAIN:
+        load_kernels()
     known = len(sys.modules)
     if name not in MODULES:  # a script
         sys.path.append(str(Path(arguments[0]).parent))
@@ -298,11 +307,10 @@ def serve(entrance: socket.socket, owner: int) -> None:
 
 
 def main() -> None:
-    """Load what the programs call most, then serve."""
+    """Load what all programs call, then serve."""
     setproctitle('fork server')  # before the environment is changed, in which it finds its room
     node_interface.DIAGNOSTICS_PERIOD = PERIOD
     recorded_runs.ANNOUNCED = 0.0  # s: the domain of a test is its own, no stranger is looked for
-    warm_up(load_scenario('case1'), ['gvc'])
     for kind in (ParameterEvent, *(topic.type for topic in TOPICS)):
         check_for_type_support(kind)
     entrance, owner = map(int, sys.argv[1:])

@@ -10,6 +10,7 @@ import psutil
 import pytest
 from helpers import needs
 from helpers.fork_server import OWNER
+from helpers.node_processes import fork_server
 from helpers.patience import patience
 
 TESTS = Path(__file__).resolve().parents[1]
@@ -96,21 +97,21 @@ KILLED = """
 import os
 from helpers.node_processes import fresh_domain, start_node
 
-node = start_node('setpoint_node', fresh_domain())
-assert 'begins' in node.stdout.readline()
-print(node.pid, flush=True)
-os.killpg(0, 9)
+if __name__ == '__main__':
+    node = start_node('setpoint_node', fresh_domain())
+    assert 'begins' in node.stdout.readline()
+    print(node.pid, flush=True)
+    os.killpg(0, 9)
 """
 
 
-def test_a_run_that_is_killed_leaves_none_of_its_programs() -> None:
-    environ = {**os.environ, 'PYTHONPATH': str(TESTS), OWNER: ''}
-    command = [sys.executable, '-c', KILLED]
-    ended = subprocess.run(
-        command, env=environ, stdout=subprocess.PIPE, text=True, start_new_session=True, check=False
-    )
-    assert ended.returncode == -9
-    left, limit = int(ended.stdout), time.monotonic() + patience(10)
+def test_a_run_that_is_killed_leaves_none_of_its_programs(tmp_path: Path) -> None:
+    script = tmp_path / 'killed_run.py'
+    script.write_text(KILLED)
+    run = fork_server().start([str(script)], {**os.environ, OWNER: ''})  # which starts another one
+    said, _ = run.communicate(timeout=patience(60))
+    assert run.returncode == -9, said
+    left, limit = int(said), time.monotonic() + patience(10)
     while psutil.pid_exists(left):
         assert time.monotonic() < limit
         time.sleep(0.01)

@@ -1,6 +1,7 @@
 """Fuzzing of everything that comes from outside: `make fuzz`, see README.md beside this file."""
 
 import argparse
+import gc
 import itertools
 import json
 import os
@@ -181,6 +182,11 @@ def together(targets: Sequence[str], count: int, seed: int, jobs: int) -> int:
     import structures  # noqa: F401
     from compile_kernels import LAWS, compile_law
 
+    from auv_analysis import load_scenario
+    from auv_analysis.simulation.simulate import warm_up
+
+    warm_up(load_scenario('case1'), ['gvc'])  # with what most of them load
+    gc.freeze()  # none of them looks through it for garbage
     for law in LAWS if count > FEW else ():  # no input waits for the compiler
         compile_law(law)
 

@@ -123,10 +123,11 @@ WRONG_LINES = {  # what is typed -> what the one line names
     'analyze taken/notes.md': 'taken/notes.md',
 }
 INSTALLED = [  # of these, the ones that are also tried as the user runs them
-    'fly', 'simulate case9', 'run case1 --domain-id 102', 'run case1 --out taken',
+    'fly', 'run case1 --out taken',
     *(pytest.param(line, marks=pytest.mark.long) for line in (
-        'simulate case1 --hold foh', 'simulate case1 --out taken', 'info taken/notes.md',
-        'run case1 --controller gvc --controller pid', 'sweep case1_gains --out taken',
+        'simulate case9', 'run case1 --domain-id 102', 'simulate case1 --hold foh',
+        'simulate case1 --out taken', 'info taken/notes.md', 'sweep case1_gains --out taken',
+        'run case1 --controller gvc --controller pid',
     )),
 ]  # fmt: skip
 

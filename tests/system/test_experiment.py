@@ -4,7 +4,9 @@ import json
 import os
 import signal
 import time
+from contextlib import nullcontext
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -19,15 +21,17 @@ from helpers.graph_runs import (
     start,
     start_installed,
 )
-from helpers.node_processes import auv, fresh_domain, installed_auv
+from helpers.node_processes import Peer, auv, fresh_domain, installed_auv
 from helpers.patience import patience
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.bag.load import load_run
 from auv_analysis.bag.reading import read_bag
+from auv_analysis.cli.main import main
+from auv_analysis.graph import recorded_runs
 from auv_analysis.output.folder import results_folder
 from auv_dynamics.files.errors import ENDING
-from auv_dynamics.ros import interface
+from auv_dynamics.ros import interface, topics
 from auv_dynamics.vehicle.kinematics import quaternion
 
 GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
@@ -219,20 +223,19 @@ def test_a_diverging_loop_says_so(tmp_path: Path) -> None:
     assert not nodes(tmp_path)
 
 
-def test_a_domain_with_another_vehicle_is_refused(tmp_path: Path) -> None:
-    from helpers.node_processes import Peer
-
-    from auv_dynamics.ros import topics
-
+def test_a_domain_with_another_vehicle_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    monkeypatch.setattr(recorded_runs, 'ForkServer', nullcontext)  # it would have threads
     domain = fresh_domain()
     peer = Peer(domain)
     peer.node.create_publisher(topics.WRENCH.type, '/other/wrench', 10)
-    scenario = write(tmp_path / 's.yaml')
     told = '--out', str(tmp_path / 'out'), '--domain-id', str(domain)
-    ended = installed_auv('run', str(scenario), *told)
+    with patch.dict(os.environ), pytest.raises(SystemExit, match='2'):
+        main(['run', str(write(tmp_path / 's.yaml')), *told])
     peer.close()
-    assert ended.returncode == 2
-    assert 'test_peer on /other/wrench' in ended.stderr
+    assert 'test_peer on /other/wrench' in capsys.readouterr().err
+    assert not (tmp_path / 'out').exists()
 
 
 @pytest.mark.long

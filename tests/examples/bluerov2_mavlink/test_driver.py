@@ -37,7 +37,6 @@ class Sea:
     """Driver, wire and vehicle, and a controller of the test's own: it answers with one wrench."""
 
     def __init__(self, start: Callable[..., Any] = fork_program) -> None:
-        self.start = start
         self.domain = fresh_domain()
         port = free_port(self.domain)
         self.relay = Relay(port)
@@ -58,7 +57,7 @@ class Sea:
 
     def launch(self):
         """A vehicle that has just been booted."""
-        return self.start(
+        return fork_program(
             'ardusub_endpoint.py',
             self.domain,
             '--connection',

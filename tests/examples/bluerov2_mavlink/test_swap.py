@@ -71,12 +71,17 @@ def dive(tmp_path_factory):
         try:
             peer.until(lambda: peer.heard[WRENCH.name], 'the first wrench')
 
+            speeds: list[np.ndarray] = []  # of the odometry
+
             def reached() -> bool:
-                heard = peer.heard[topics.DIAGNOSTICS.name]
+                heard, said = peer.heard[topics.DIAGNOSTICS.name], peer.heard[ODOM.name]
+                speeds.extend(
+                    interface.read_odometry(m, FRAMES)[1][7:] for m in said[len(speeds) :]
+                )
                 if any('~/arm (' in one.message for array in heard for one in array.status):
                     heard.clear()  # the machine stood still, and the driver let go
                     peer.call(SetBool, '/rov/bluerov2_driver/arm', SetBool.Request(data=True))
-                return tracks(peer.heard[ODOM.name])
+                return tracks(speeds)
 
             peer.until(reached, 'the set-point reached')
         finally:
@@ -86,10 +91,9 @@ def dive(tmp_path_factory):
         yield bag, peer.heard
 
 
-def tracks(messages: list) -> bool:
+def tracks(speeds: list) -> bool:
     """Whether the last second's mean velocity is that of the set-point."""
-    last = [interface.read_odometry(m, FRAMES)[1][7:] for m in messages[-50:]]
-    return len(messages) > 200 and bool((np.abs(np.mean(last, 0) - SETPOINT) < NEAR).all())
+    return len(speeds) > 200 and bool((np.abs(np.mean(speeds[-50:], 0) - SETPOINT) < NEAR).all())
 
 
 def test_the_bag_is_complete_and_tells_its_run(dive) -> None:

@@ -241,7 +241,7 @@ class PlantNode(BulkNode):
         self.paused, self.resumed = p.start_paused, 0.0  # and when, steady clock, s
         self._started: float | None = None
         self._alone = time.monotonic()  # when nobody else published the clock
-        steady_timer(self, 0.05, self._start)
+        self._starter = steady_timer(self, 0.05, self._start)
 
     def _make_plant(self, p: PlantSettings) -> Plant:
         grid = p.grid(self.get_name())
@@ -284,7 +284,9 @@ class PlantNode(BulkNode):
     def _start(self) -> None:
         now = time.monotonic()
         newcomer = self._started is None or now - self._started < NEW
-        if newcomer and self._publish_clock is not None and not self._is_only_clock(now):
+        if not newcomer:
+            self._starter.cancel()
+        elif self._publish_clock is not None and not self._is_only_clock(now):
             return
         met = now - self._born >= MET and self.exit_code is None
         if met and self.graph.ready() and not self.peers.not_ready() and not self.paused:

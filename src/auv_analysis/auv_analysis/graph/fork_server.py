@@ -14,7 +14,7 @@ import socket
 import sys
 import time
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import IO, Any, NoReturn, Self
@@ -57,10 +57,11 @@ class ForkServer:
     def __init__(self, modules: Mapping[str, str]):
         self._end, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         ctypes.CDLL(None).prctl(SUBREAPER, 1, 0, 0, 0)
+        mains = {name: import_module(module).main for name, module in modules.items()}
         self._pid = fork()
         if not self._pid:
             try:
-                _serve(theirs, modules)
+                _serve(theirs, mains)
             except BaseException:
                 traceback.print_exc()
             finally:
@@ -97,7 +98,7 @@ class ForkServer:
             return psutil.Popen(command, env=env, stdout=stdout, **more)
 
 
-def _serve(asked: socket.socket, modules: Mapping[str, str]) -> NoReturn:
+def _serve(asked: socket.socket, mains: Mapping[str, Callable[[], Any]]) -> NoReturn:
     """Fork what is asked for, until nobody can ask any more."""
     setproctitle('auv fork server')
     os.setsid()  # Ctrl-C is for who asks, who ends the nodes in order
@@ -105,7 +106,6 @@ def _serve(asked: socket.socket, modules: Mapping[str, str]) -> NoReturn:
         signal.signal(end, signal.SIG_DFL)
     os.closerange(3, asked.fileno())
     os.closerange(asked.fileno() + 1, os.sysconf('SC_OPEN_MAX'))
-    mains = {name: import_module(module).main for name, module in modules.items()}
     gc.freeze()  # no page of these is copied because a program looks for its garbage
     while True:
         data, files, *_ = socket.recv_fds(asked, SIZE, 1)

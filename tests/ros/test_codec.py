@@ -51,9 +51,7 @@ def codec_of(kind: type) -> Codec:
 
 def long_way(kind: type) -> Codec:
     """A codec that knows no layout."""
-    codec = Codec(kind, FRAMES, 'topic')
-    codec.layout = None
-    return codec
+    return Codec(kind, FRAMES, 'topic', patched=False)
 
 
 @pytest.mark.parametrize('kind', KINDS)
@@ -89,20 +87,20 @@ def test_without_a_layout_messages_are_sent_and_read_all_the_same(kind: type) ->
 
 
 @pytest.mark.parametrize('kind', READ)
-@pytest.mark.parametrize('place', range(13))
 @pytest.mark.parametrize('bad', [float('nan'), float('inf'), float('-inf'), 1e31])
-def test_a_number_that_is_not_finite_is_refused_alike(kind: type, place: int, bad: float) -> None:
-    values = list(numbers(kind, [1.0] * 13))
-    values[place % len(values)] = bad
-    data = as_bytes(kind, 3, tuple(values))
-    texts = []
-    for codec in (Codec(kind, FRAMES, 'topic'), long_way(kind)):
-        with pytest.raises(
-            BadMessageError, match=r'topic: (not finite: expected finite numbers|absurd)'
-        ) as refusal:
-            codec.decode(data)
-        texts.append(str(refusal.value))
-    assert texts[0] == texts[1]
+def test_a_number_that_is_not_finite_is_refused_alike(kind: type, bad: float) -> None:
+    for place in range(KINDS[kind].size):
+        values = list(numbers(kind, [1.0] * 13))
+        values[place] = bad
+        data = as_bytes(kind, 3, tuple(values))
+        texts = []
+        for codec in (codec_of(kind), long_way(kind)):
+            with pytest.raises(
+                BadMessageError, match=r'topic: (not finite: expected finite numbers|absurd)'
+            ) as refusal:
+                codec.decode(data)
+            texts.append(str(refusal.value))
+        assert texts[0] == texts[1], place
 
 
 FOREIGN = {
@@ -117,7 +115,7 @@ FOREIGN = {
 @pytest.mark.parametrize('which', FOREIGN)
 def test_another_frame_is_refused_alike(kind: type, which: str) -> None:
     data = as_bytes(kind, 3, numbers(kind, [1.0] * 13), FOREIGN[which])
-    for codec in (Codec(kind, FRAMES, 'topic'), long_way(kind)):
+    for codec in (codec_of(kind), long_way(kind)):
         with pytest.raises(BadMessageError, match=r'topic: header\.frame_id: expected'):
             codec.decode(data)
 
@@ -128,7 +126,7 @@ def test_a_stamp_that_is_none_is_refused_alike(kind: type, sec: int, nanosec: in
     message = as_message(kind, 3, numbers(kind, [1.0] * 13))
     message.header.stamp = Time(sec=sec, nanosec=nanosec)
     data = bytes(serialize_message(message))
-    for codec in (Codec(kind, FRAMES, 'topic'), long_way(kind)):
+    for codec in (codec_of(kind), long_way(kind)):
         with pytest.raises(BadMessageError, match='topic: no stamp: expected 0 s or later'):
             codec.decode(data)
 
@@ -141,7 +139,7 @@ def test_another_child_frame_of_equal_length_is_refused() -> None:
 
 def test_no_unit_quaternion_is_refused_alike() -> None:
     data = as_bytes(Odometry, 3, (1.0,) * 13)
-    for codec in (Codec(Odometry, FRAMES, 'odom'), long_way(Odometry)):
+    for codec in (codec_of(Odometry), long_way(Odometry)):
         with pytest.raises(BadMessageError, match='expected a unit quaternion, found norm 2'):
             codec.decode(data)
 
@@ -160,7 +158,7 @@ def test_joints_that_are_no_degrees_of_freedom_are_refused_alike(names, effort) 
     message = as_message(JointState, 3, (1.0,) * 6)
     message.name, message.effort = names, effort
     data = bytes(serialize_message(message))
-    for codec in (Codec(JointState, FRAMES, 'topic'), long_way(JointState)):
+    for codec in (codec_of(JointState), long_way(JointState)):
         with pytest.raises(BadMessageError, match=r"topic: name: expected \['surge'"):
             codec.decode(data)
 

@@ -64,7 +64,7 @@ def calm(deep: DirectPeer) -> dict[str, np.ndarray]:
 
 @pytest.fixture(scope='module')
 def turning(deep: DirectPeer) -> dict[str, np.ndarray]:
-    return anew(deep).run(2.0, TURNING)
+    return anew(deep).run(1.2, TURNING)
 
 
 def attitudes(told: dict[str, np.ndarray]) -> Rotation:
@@ -149,18 +149,18 @@ def test_motion_is_that_of_the_second_implementation(turning: dict, vehicle: str
 
 
 def test_neutral_and_silent_motors_do_nothing(peer: DirectPeer) -> None:
-    neutral = peer.run(0.5)
+    neutral = peer.run(0.2)
     peer.count = 0
-    silent = peer.run(0.5, [0] * 16)
+    silent = peer.run(0.2, [0] * 16)
     peer.count = 0
-    within = peer.run(0.5, [1480, 1520] * 8)  # the dead band of the speed controller
+    within = peer.run(0.2, [1480, 1520] * 8)  # the dead band of the speed controller
     for told in (silent, within):
         assert np.array_equal(told['velocity'], neutral['velocity'])
 
 
 def test_a_buoyant_vehicle_stays_at_the_surface() -> None:
     with direct('--vehicle', 'bluerov2', '--eta', *SHALLOW, rate=100) as peer:
-        told = peer.run(8.0)
+        told = peer.run(5.0)
     depth = told['position'][:, 2]
     assert depth[0] > 0.04
     assert (depth >= 0).all()
@@ -210,9 +210,9 @@ def test_the_scenario_and_the_options_reach_the_physics(tmp_path: Path, monkeypa
 def test_the_rate_of_frames_is_no_part_of_the_physics(rate: int, tmp_path: Path) -> None:
     spec = {'thrusters': True, 'rotor_lag': 0.0}  # rotors are held over a step
     with direct('--scenario', scenario(tmp_path, actuators=spec)) as peer:
-        usual = peer.run(1.0, TURNING)
+        usual = peer.run(0.5, TURNING)
         peer.count, peer.rate = 0, rate
-        other = peer.run(1.0, TURNING)
+        other = peer.run(0.5, TURNING)
     for key in ('position', 'velocity', 'gyro', 'quaternion'):
         assert other[key][-1] == pytest.approx(usual[key][-1], abs=1e-7)
 
@@ -234,11 +234,11 @@ def test_velocity_in_a_current_is_over_ground(tmp_path: Path) -> None:
 def test_disturbances_go_on_when_the_rate_changes(tmp_path: Path) -> None:
     push = [{'kind': 'harmonic', 'surge': {'terms': [{'amplitude': 10.0, 'omega': 3.0}]}}]
     with direct('--scenario', scenario(tmp_path, disturbance=push)) as peer:
-        steady = peer.run(1.5)
+        steady = peer.run(0.6)
         peer.count = 0
-        peer.run(0.5)
+        peer.run(0.3)
         peer.rate = 1000
-        changed = peer.run(1.0)
+        changed = peer.run(0.3)
     for key in ('position', 'velocity'):
         assert changed[key][-1] == pytest.approx(steady[key][-1], abs=1e-6)
 
@@ -258,9 +258,9 @@ def test_a_thruster_that_fails_is_that_of_its_motor(tmp_path: Path) -> None:
     fault = {'kind': 'thruster', 'thruster': 'T2', 'efficiency': 0.0, 'from': 0.5}
     spec = {'faults': [fault], 'actuators': {'thrusters': True}}
     with direct('--scenario', scenario(tmp_path, **spec)) as peer:
-        told = peer.run(1.0, AHEAD)
+        told = peer.run(0.6, AHEAD)
         peer.count = 0
-        again = peer.run(1.0, AHEAD)
+        again = peer.run(0.6, AHEAD)
     assert np.abs(told['gyro'][:200, [0, 2]]).max() < 1e-9  # surge pitches, and no more
     without = [1500 if motor == 1 else pulse for motor, pulse in enumerate(AHEAD)]
     lost = wrench('bluerov2_heavy', AHEAD) - wrench('bluerov2_heavy', without)

@@ -111,7 +111,8 @@ class Peer:
             domain_id=domain,
             signal_handler_options=SignalHandlerOptions.NO,
         )
-        self.node = rclpy.create_node('test_peer', context=self.context)
+        bare = {'start_parameter_services': False, 'enable_rosout': False}
+        self.node = rclpy.create_node('test_peer', context=self.context, **bare)
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
         self.heard: dict[str, list[Any]] = {}
@@ -147,7 +148,8 @@ class Peer:
 
         def nodes() -> set[str]:
             found = self.node.get_subscriptions_info_by_topic(topic.name)
-            return {f'{one.node_namespace.rstrip("/")}/{one.node_name}' for one in found}
+            known = {f'{one.node_namespace.rstrip("/")}/{one.node_name}' for one in found}
+            return known - {'/test_peer'}  # which has no services
 
         def asked() -> set[str]:
             services = dict(self.node.get_service_names_and_types())

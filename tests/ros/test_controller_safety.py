@@ -1,10 +1,9 @@
 """The controller beside a real driver: each fault, the promised reaction, and the way back."""
 
 import math
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,10 +12,10 @@ from helpers.node_processes import (
     PATIENCE,
     Peer,
     change,
-    environment,
     fresh_domain,
     graph,
     parameters,
+    start_node,
     stop,
 )
 from helpers.patience import patience
@@ -377,18 +376,18 @@ def second_fails(self):
     return build(self)
 
 
-ControllerParameters.build = second_fails
-controller_node.main()
+if __name__ == '__main__':
+    ControllerParameters.build = second_fails
+    controller_node.main()
 """
 
 
-def test_an_error_inside_a_transition_leaves_no_wrench_and_can_be_mended() -> None:
+def test_an_error_inside_a_transition_leaves_no_wrench_and_can_be_mended(tmp_path: Path) -> None:
     domain = fresh_domain()
     peer = Peer(domain)
-    arguments = ['--ros-args', *REAL, *parameters(autostart=False)]
-    process = subprocess.Popen(
-        [sys.executable, '-c', BROKEN_BUILD, *arguments], env=environment(domain)
-    )
+    script = tmp_path / 'broken_controller.py'
+    script.write_text(BROKEN_BUILD)
+    process = start_node(str(script), domain, *REAL, *parameters(autostart=False))
     try:
         driver = Driver(peer)
         assert change(peer, Transition.TRANSITION_CONFIGURE)
@@ -399,8 +398,8 @@ def test_an_error_inside_a_transition_leaves_no_wrench_and_can_be_mended() -> No
         driver.works()
     finally:
         peer.close()
-        process.terminate()
-        assert process.wait(timeout=patience(30)) == 0
+        code, output = stop(process)
+    assert code == 0, output
 
 
 STEPS = {  # s -> surge, m/s

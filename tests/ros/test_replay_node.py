@@ -338,7 +338,7 @@ def test_an_odometry_without_a_stamp_is_refused_where_it_would_be_answered() -> 
 
 def test_waits_for_a_subscriber_that_is_stopped(tmp_path: Path) -> None:
     """At full speed, with more messages than a subscription keeps: none is lost, none is late."""
-    steps, domain = 8000, fresh_domain()
+    steps, domain = DEPTH + 1000, fresh_domain()
     bag = odometry_alone(tmp_path / 'bag.mcap', steps)
     recorder = start_node(
         'recorder_node', domain, '-p', 'topics:=["odom"]', '-r', '__ns:=/replay',

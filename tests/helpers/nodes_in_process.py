@@ -21,6 +21,7 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
 from auv_analysis.nodes import replay_node
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.nodes import plant_node
 from auv_dynamics.ros import node_interface
 
@@ -99,6 +100,14 @@ def program(domain: int | None = None) -> Iterator[Program]:
             yield made
     finally:
         made.close()
+
+
+def assert_refused(make: type, arguments: list[str], *words: str) -> None:
+    """Wrong input: the one line with which the node's process ends has the words in it."""
+    with program() as made, pytest.raises(InputError) as caught:
+        made.add(make, arguments)
+    for word in words:
+        assert word in str(caught.value)
 
 
 def write_vehicle(folder: Path, data: dict[str, Any]) -> Path:

@@ -15,11 +15,10 @@ from helpers.node_processes import (
     fresh_domain,
     graph,
     parameters,
-    run_node,
     start_node,
     stop,
 )
-from helpers.nodes_in_process import Program, program
+from helpers.nodes_in_process import Program, assert_refused, program
 from helpers.patience import patience
 from helpers.stalls import undisturbed
 from std_srvs.srv import SetBool, Trigger
@@ -428,7 +427,7 @@ def test_a_second_clock_is_refused_by_who_comes_later() -> None:
     ],
 )
 def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
-    assert_one_line(run_node('plant_node', *arguments), key, expected)
+    assert_refused(PlantNode, arguments, key, expected)
 
 
 def test_real_time_withholds_a_lost_sample() -> None:
@@ -469,7 +468,7 @@ def test_real_time_withholds_a_lost_sample() -> None:
 )  # fmt: skip
 def test_wrong_uncertainty_ends_with_one_line(extra, words) -> None:
     lockstep = parameters(**LOCKSTEP)
-    assert_one_line(run_node('plant_node', *lockstep, *parameters(**extra)), *words)
+    assert_refused(PlantNode, [*lockstep, *parameters(**extra)], *words)
 
 
 def test_to_run_starts_no_plant_beside_another_clock(monkeypatch: pytest.MonkeyPatch) -> None:

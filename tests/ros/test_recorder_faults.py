@@ -15,10 +15,12 @@ import pytest
 from helpers.damaged_bags import seen_by_rosbags
 from helpers.disks import no_more_files, small_disk
 from helpers.needs import need
-from helpers.node_processes import assert_one_line, graph, parameters, run_node, stop
+from helpers.node_processes import graph, parameters, run_node, stop
+from helpers.nodes_in_process import assert_refused
 
 from auv_analysis.bag.reading import read_bag
 from auv_analysis.bag.recover import recover
+from auv_analysis.nodes.recorder_node import RecorderNode
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.interface import Frames, nanoseconds
 
@@ -246,8 +248,8 @@ WRONG = {
 def test_a_wrong_storage_parameter_ends_in_one_line(
     tmp_path: Path, name: str, value: object
 ) -> None:
-    ended = run_node('recorder_node', *parameters(bag=tmp_path / 'bag', **{name: value}))
-    assert_one_line(ended, name.replace('__', '.'))
+    given = parameters(bag=tmp_path / 'bag', **{name: value})
+    assert_refused(RecorderNode, given, name.replace('__', '.'))
     assert not (tmp_path / 'bag').exists()
 
 

@@ -17,14 +17,13 @@ from diagnostic_msgs.msg import DiagnosticArray
 from helpers.node_processes import (
     PATIENCE,
     Peer,
-    assert_one_line,
     fresh_domain,
     graph,
     parameters,
     run_node,
     stop,
 )
-from helpers.nodes_in_process import Program, program
+from helpers.nodes_in_process import Program, assert_refused, program
 from helpers.patience import patience
 from mcap.reader import make_reader
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -616,7 +615,7 @@ def test_refuses_a_folder_that_holds_a_bag(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str) -> None:
-    assert_one_line(run_node('recorder_node', *arguments), key)
+    assert_refused(RecorderNode, arguments, key)
     assert not Path('x').exists()
 
 

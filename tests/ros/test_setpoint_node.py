@@ -5,8 +5,8 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from helpers.node_processes import Peer, assert_one_line, parameters, run_node
-from helpers.nodes_in_process import program
+from helpers.node_processes import Peer, parameters
+from helpers.nodes_in_process import assert_refused, program
 from helpers.patience import patience
 from rcl_interfaces.srv import GetParameters
 
@@ -168,7 +168,7 @@ def test_refuses_odometry_in_another_frame() -> None:
     ],
 )
 def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
-    assert_one_line(run_node('setpoint_node', *arguments), key, expected)
+    assert_refused(SetpointNode, arguments, key, expected)
 
 
 def test_goes_on_when_the_driver_starts_again_with_its_clock_at_zero(monkeypatch) -> None:

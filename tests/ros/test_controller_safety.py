@@ -417,7 +417,8 @@ def test_set_points_by_hand_take_little_more_than_holds_the_speed() -> None:
     law += parameters(gains__k_D='[3.0]', gains__k_I='[0.0]', gains__Lambda='[1e-9]')
     law += parameters(gains__Gamma='[0.0]', use_sim_time=True, setpoint_timeout=patience(0.5))
     with graph(
-        ('plant_node', parameters(vehicle='herman2018_neutral')), ('controller_node', law)
+        ('plant_node', parameters(vehicle='herman2018_neutral', step=PERIOD)),
+        ('controller_node', law),
     ) as (peer, _):
         peer.listen(topics.WRENCH)
         odometry, wrenches = [], peer.heard['wrench']

@@ -34,7 +34,7 @@ from auv_analysis.nodes.driver_check_node import COMMANDER, RosDriverClient, _ar
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
 
-SECONDS = 3.0  # of listening
+SECONDS = 2.0  # of listening
 SLOW = 1.2 * faulty_drivers.SLOW  # Hz: it is slower where the machine stands still, not faster
 TOPICS = {interface.ODOM: interface.ODOM, interface.WRENCH: interface.WRENCH}
 # a machine that is busy with other tests may keep all of them waiting

@@ -19,7 +19,7 @@ from auv_analysis.driver.excitation import GOODBYE, PERIOD
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.interface import Frames, wrench_of
 
-VEHICLE = parameters(vehicle='bluerov2_heavy', step=0.02, initial__eta='[0.0,0.0,5.0,0.0,0.0,0.8]')
+VEHICLE = parameters(vehicle='bluerov2_heavy', step=0.04, initial__eta='[0.0,0.0,5.0,0.0,0.0,0.8]')
 LIMIT = patience(180.0)  # s
 RATE = 50.0  # Hz
 ZERO = (0.0,) * 6

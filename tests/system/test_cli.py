@@ -125,9 +125,8 @@ WRONG_LINES = {  # what is typed -> what the one line names
 INSTALLED = [  # of these, the ones that are also tried as the user runs them
     'fly', 'run case1 --out taken',
     *(pytest.param(line, marks=pytest.mark.long) for line in (
-        'simulate case9', 'run case1 --domain-id 102', 'simulate case1 --hold foh',
-        'simulate case1 --out taken', 'info taken/notes.md', 'sweep case1_gains --out taken',
-        'run case1 --controller gvc --controller pid',
+        'simulate case1 --hold foh', 'simulate case1 --out taken', 'info taken/notes.md',
+        'run case1 --controller gvc --controller pid', 'sweep case1_gains --out taken',
     )),
 ]  # fmt: skip
 

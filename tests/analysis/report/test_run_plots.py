@@ -336,10 +336,13 @@ def test_shares_of_the_mean_energy_are_those_of_their_runs(three, runs) -> None:
         shapes[name] = style.get_path().transformed(style.get_transform()).vertices
     found: dict[tuple, float] = {}
     for dots in axes.collections:
-        (path,), ((x, y),) = dots.get_paths(), dots.get_offsets()
+        (path,), edges = dots.get_paths(), [to_hex(one) for one in dots.get_edgecolor()]
         (name,) = [n for n, s in shapes.items() if np.array_equal(s, path.vertices)]
-        whole = to_hex(dots.get_facecolor()[0]) == '#ffffff'
-        found[name, whole, round(y)] = x
+        inside = [to_hex(one) for one in dots.get_facecolor()]
+        assert edges == [colour.lower() for colour in plots.COLOURS]
+        whole = inside == ['#ffffff']
+        assert whole or inside == edges
+        found |= {(name, whole, round(y)): x for x, y in dots.get_offsets()}
     assert len(found) == 36
     for (name, whole, i), x in found.items():
         run = runs[name]

@@ -363,10 +363,9 @@ def energy_shares(runs: Mapping[str, RunDigest]) -> Drawn:
     handles, smallest = [], 1.0
     for offset, marker, run in zip(offsets, MARKERS * rows, runs.values(), strict=False):
         early, whole = (shares(run.part('energy', 0.0, last).mean) for last in (end, FOREVER))
-        for i in range(6):
-            place = {'y': i + offset, 'marker': marker, 'edgecolors': COLOURS[i], 's': 30}
-            axes.scatter(whole[i], facecolors='white', linewidths=1.0, zorder=3, **place)
-            axes.scatter(early[i], facecolors=COLOURS[i], linewidths=1.0, zorder=4, **place)
+        place = {'y': np.arange(6) + offset, 'marker': marker, 'edgecolors': COLOURS, 's': 30}
+        axes.scatter(whole, facecolors='white', linewidths=1.0, zorder=3, **place)
+        axes.scatter(early, facecolors=COLOURS, linewidths=1.0, zorder=4, **place)
         both = np.append(early, whole)
         smallest = min([smallest, *both[both > 0]])
         handles.append(Line2D([], [], linestyle='', marker=marker, color='black', markersize=5))

@@ -155,7 +155,8 @@ def test_topics_and_nodes_are_listed_with_their_health() -> None:
     assert row(found, interface.ODOM)[1:5] == ['100', '0.2', 's', '0']
     assert any(line.split()[-2:] == ['node', 'health'] for line in found)
     assert row(found, interface.PROGRESS)[-2:] == ['–', '–']
-    assert any(line.startswith(f'and {len(FULL.topics)} more') for line in lines(FULL, 80, 12))
+    low = [line.split() for line in lines(FULL, 80, 12)]
+    assert ['and', f'{len(FULL.topics)}', 'more', 'and', f'{len(FULL.nodes)}', 'more'] in low
     assert 'auv1/controller_node  error refused 3' in text
     assert 'auv1/plant_node       ok step 1234' in text
     assert 'stale for 7.0 s not ready' in text

@@ -170,14 +170,17 @@ def topics_table(snapshot: Snapshot, rows: int | None = None) -> Table:
         if (topic.publishers or topic.heard or topic.name in BASIC)
         and topic.name != interface.DIAGNOSTICS  # shown as nodes
     ]
-    left_out = 0
-    if rows is not None and len(shown) > rows:
-        left_out = len(shown) - rows + 1  # the line that says so takes one as well
-    for topic in shown[: len(shown) - left_out]:
-        table.add_row(*_topic_row(topic))
+    _add_rows(table, [_topic_row(topic) for topic in shown], rows)
+    return table
+
+
+def _add_rows(table: Table, found: Sequence[Sequence[Text]], rows: int | None) -> None:
+    """Add what was found; of more than so many rows the last one says how many are left out."""
+    left_out = len(found) - rows + 1 if rows is not None and len(found) > rows else 0
+    for row in found[: len(found) - left_out]:
+        table.add_row(*row)
     if left_out:
         table.add_row(f'and {left_out} more', style='dim')
-    return table
 
 
 def _topic_row(topic: TopicState) -> list[Text]:
@@ -198,8 +201,8 @@ def nodes_table(snapshot: Snapshot, rows: int | None = None, *, facts: bool = Tr
     table = _table(2)
     table.add_column('node', no_wrap=True, min_width=NAME)
     table.add_column('health', no_wrap=True, overflow='ellipsis')
-    for node in snapshot.nodes[:rows]:
-        table.add_row(Text(node.name.removeprefix('/')), _health(node, facts=facts))
+    found = [(Text(n.name.removeprefix('/')), _health(n, facts=facts)) for n in snapshot.nodes]
+    _add_rows(table, found, rows)
     if not snapshot.nodes:
         table.add_row(Text(f'none on {interface.DIAGNOSTICS}', 'dim'))
     return table

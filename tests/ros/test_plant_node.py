@@ -346,9 +346,9 @@ def test_a_pause_in_real_time_is_bounded_and_said() -> None:
         after = step_of(odometry(peer, count + 3)[count + 2])
         code, output = stop(process)
     assert after - before < 250, 'three seconds are not made up for'
-    (late, step), *_ = re.findall(r' ([\d.]+) s late: time goes on from step (\d+)\n', output)
-    assert float(late) > 1.0
-    assert before <= int(step) <= after
+    said = re.findall(r' ([\d.]+) s late: time goes on from step (\d+)\n', output)
+    assert all(float(late) > 1.0 for late, _ in said)
+    assert any(before <= int(step) <= after for _, step in said)  # it may be late before as well
     assert code == 0
 
 

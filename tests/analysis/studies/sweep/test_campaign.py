@@ -139,8 +139,8 @@ def test_readme_counts_the_shipped_campaign() -> None:
 @pytest.mark.parametrize(
     ('duration', 'count', 'block'),
     [
-        (10.0, 10_000, 500),  # of 1000 steps each: half a million
-        (100.0, 10_000, 50),
+        (10.0, 10_000, 1000),  # of 1000 steps each: a million
+        (100.0, 10_000, 100),
         (10_000.0, 1000, 16),
         (10.0, 2_001, 251),  # an eighth
         (10.0, 20, 16),

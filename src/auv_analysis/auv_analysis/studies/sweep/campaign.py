@@ -34,7 +34,7 @@ NOT_VARIED = {
     'controllers': 'a path into one of them, or into each, such as controllers.*.k_D',
 }
 MOST_ROLLOUTS = 2**53
-STEPS_AT_ONCE = 500_000  # of a block, about: a fraction of a second, compiled
+STEPS_AT_ONCE = 1_000_000  # of a block, about: a fraction of a second, compiled
 PLAIN_BLOCK = 8  # rollouts of a user's own law: as plain Python a second or more each
 SMALLEST_BLOCK, LARGEST_BLOCK = 16, 1024
 BLOCKS_AT_LEAST = 8  # so that every core has something to do

@@ -55,7 +55,7 @@ def try_messages(data: bytes) -> str:
     _judged(controller.odometry(SECOND, good[0][1], Now(0.0)))
     verdict = 'refused'
     try:
-        first_stamp(data[1:])
+        first_stamp(data[1:], topic.name)
         ns, values = CODECS[topic].decode(data[1:])
         if topic is topics.ODOM:
             _judged(controller.odometry(ns, values, Now(0.01)))

@@ -64,7 +64,7 @@ def test_a_patched_template_is_the_message(kind: type, ns: int, values: list) ->
     assert deserialize_message(encoded, kind) == as_message(kind, ns, values)
     STORE.deserialize_cdr(encoded, type_name(kind))  # which allows no unused bytes behind it
     assert len(encoded) <= len(as_bytes(kind, ns, values))
-    assert first_stamp(encoded) == ns
+    assert first_stamp(encoded, 'topic') == ns
 
 
 @pytest.mark.parametrize('kind', READ)
@@ -175,7 +175,7 @@ def test_the_other_byte_order_goes_the_long_way() -> None:
     codec = Codec(WrenchStamped, FRAMES, 'wrench')
     assert codec.layout.unpack(bytes(big)) is None
     assert codec.decode(bytes(big)) == (7 * 10**9 + 9, values)
-    assert first_stamp(bytes(big)) == 7 * 10**9 + 9
+    assert first_stamp(bytes(big), 'topic') == 7 * 10**9 + 9
 
 
 @pytest.mark.parametrize('frames', [Frames('a', 'a'), Frames('a', ''), Frames('é', 'Länge_2')])
@@ -240,7 +240,8 @@ def test_every_kind_is_read_by_the_reader_of_its_topic() -> None:
 
 def test_first_stamp_of_messages_that_begin_with_one() -> None:
     stamp = as_message(Clock, 5 * 10**9 + 3, ()).clock
-    assert first_stamp(bytes(serialize_message(Header(stamp=stamp, frame_id='x')))) == 5 * 10**9 + 3
+    header = bytes(serialize_message(Header(stamp=stamp, frame_id='x')))
+    assert first_stamp(header, 'topic') == 5 * 10**9 + 3
     assert interface.nanoseconds(stamp) == 5 * 10**9 + 3
-    with pytest.raises(BadMessageError, match='found 11 bytes'):
-        first_stamp(bytes(11))
+    with pytest.raises(BadMessageError, match=r'^topic: .*found 11 bytes'):
+        first_stamp(bytes(11), 'topic')

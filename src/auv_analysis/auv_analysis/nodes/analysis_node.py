@@ -49,7 +49,7 @@ class AnalysisNode(BulkNode):
 
     def _watch(self, topic: topics.Topic) -> None:
         def callback(message: bytes, _: dict[str, Any]) -> None:
-            self._take(topic, first_stamp(message), message)
+            self._take(topic, first_stamp(message, topic.name), message)
 
         source = self._odometry if topic is topics.ODOM else topic
         self.graph.subscribe(source, callback, topics.every_step())

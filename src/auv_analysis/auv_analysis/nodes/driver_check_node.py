@@ -89,13 +89,13 @@ class CheckNode(BulkNode):
         frames = (message.header.frame_id, message.child_frame_id)
         x, number = interface.state_of(message), info.get('publication_sequence_number')
         try:
-            stamp = first_stamp(data)
+            stamp = first_stamp(data, self.odom)
         except interface.BadMessageError:
             stamp = NO_STAMP
         self.buffer.odometry(_arrived(info), stamp, x, frames, number)
 
     def _on_clock(self, data: bytes, info: dict[str, Any]) -> None:
-        self.buffer.clock(_arrived(info), first_stamp(data))
+        self.buffer.clock(_arrived(info), first_stamp(data, topics.CLOCK.name))
 
     def _on_applied(self, data: bytes, info: dict[str, Any]) -> None:
         message = message_of(data, WrenchStamped, topics.WRENCH_APPLIED.name)

@@ -185,7 +185,7 @@ class RecorderNode(BulkNode):
 
         def callback(message: bytes, way: dict[str, Any]) -> None:
             try:
-                ns = first_stamp(message) if timed or awaited else 0
+                ns = first_stamp(message, name) if timed or awaited else 0
             except BadMessageError:
                 self._take(resolved, kind, message, way)
                 raise

@@ -273,8 +273,7 @@ class Player:
             if self._answers is not None:
                 self._answers.expect(topic, kind, data)
         except BadMessageError as error:
-            text = str(error).removeprefix(topic).removeprefix(': ')
-            self._node.graph.refuse(f'{topic}: {text}')
+            self._node.graph.refuse(str(error))
             return
         self._publishers[topic].publish(data)
         self.receivers.sent(topic)

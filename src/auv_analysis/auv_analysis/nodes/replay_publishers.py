@@ -352,13 +352,13 @@ class Answers:
         graph.subscribe(wrench, self._take, topics.every_step())
 
     def _take(self, data: bytes, _: dict[str, Any]) -> None:
-        if first_stamp(data) == self._asked:
+        if first_stamp(data, self._topic) == self._asked:
             self._asked = None
 
     def expect(self, topic: str, kind: str, data: bytes) -> None:
         """Wait for the answer to an odometry that goes out; BadMessageError without a stamp."""
         if is_odometry(topic, kind):
-            self._asked, self._since = first_stamp(data), time.monotonic()
+            self._asked, self._since = first_stamp(data, topic), time.monotonic()
 
     def are_complete(self) -> bool:
         """Whether no answer is waited for."""

@@ -101,14 +101,13 @@ class WatchNode(BulkNode):
         def take(data: bytes, info: dict[str, Any]) -> None:
             ns, values = None, None
             try:
-                ns = first_stamp(data)
+                ns = first_stamp(data, name)
                 if codec is not None:
                     _, values = codec.decode(data)
                 elif topic is topics.DIAGNOSTICS:
                     self._diagnose(message_of(data, DiagnosticArray, name))
             except BadMessageError as error:
-                text = str(error).removeprefix(name).removeprefix(': ')
-                self._monitor.refuse(self._now, name, f'{name}: {text}')
+                self._monitor.refuse(self._now, name, str(error))
             if ns is not None:
                 number = info.get('publication_sequence_number')
                 self._monitor.hear(self._now, name, number, ns, values)

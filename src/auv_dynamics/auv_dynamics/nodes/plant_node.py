@@ -97,7 +97,7 @@ class LockStep:
         node.publish_state(node.plant.k)
 
     def _on_progress(self, message: bytes, _: dict[str, Any]) -> None:
-        self._ack = max(self._ack, first_stamp(message) // self._node.step_ns)
+        self._ack = max(self._ack, first_stamp(message, topics.PROGRESS.name) // self._node.step_ns)
         self._go_on()
 
     def _watch(self) -> None:

@@ -59,15 +59,15 @@ def byte_order(data: bytes) -> str:
 _FIRST_STAMP = {order: struct.Struct(f'{order}{STAMP}') for order in '<>'}
 
 
-def first_stamp(data: bytes) -> int:
+def first_stamp(data: bytes, topic: str) -> int:
     """Nanoseconds of a serialized message that begins with a Header or a Time.
 
-    BadMessageError where it ends before.
+    BadMessageError, which names the topic, where it ends before or has no stamp.
     """
     if len(data) < FIRST_FIELD + 8:
-        raise BadMessageError(f'expected a message with a stamp, found {len(data)} bytes')
+        raise BadMessageError(f'{topic}: expected a message with a stamp, found {len(data)} bytes')
     sec, nanosec = _FIRST_STAMP[byte_order(data)].unpack_from(data, FIRST_FIELD)
-    return interface.check_stamp('', sec, nanosec)
+    return interface.check_stamp(topic, sec, nanosec)
 
 
 def message_of(data: bytes, kind: Any, topic: str) -> Any:

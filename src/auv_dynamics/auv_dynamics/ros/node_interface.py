@@ -217,7 +217,7 @@ class NodeInterface:
             try:
                 callback(data, way)
             except BadMessageError as error:
-                text = str(error).removeprefix(': ')
+                text = str(error)
                 self.refuse(text if text.startswith(topic.name) else f'{topic.name}: {text}')
 
         events = SubscriptionEventCallbacks(

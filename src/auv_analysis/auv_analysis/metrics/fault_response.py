@@ -1,7 +1,7 @@
 """Response to faults: errors and effort before, during and after each."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,20 +119,14 @@ def _of(parts: Sequence[Part | None], name: str, column: int) -> tuple[Any, ...]
 def recovery_times(mark: Mark, run: Run, band: np.ndarray) -> list[float | None]:
     """Seconds from the end of a fault until each error has settled in its band; None: never."""
     tiny, until = 1e-6 * run.step, next_change(mark, run)
-
-    def behind() -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        for block in run.blocks():
-            inside = (block.t >= mark.end - tiny) & (block.t < until - tiny)
-            if inside.any():
-                yield block.t[inside], (block.nu_d - block.nu)[inside]
-
-    counted = [(t[0], len(t)) for t, _ in behind()]
-    if mark.end < run.start or not counted:
+    first, last = np.searchsorted(run.t, [mark.end - tiny, until - tiny])
+    if mark.end < run.start or first == last:
         return [None] * 6
-    settled, _ = settling_times(behind(), sum(count for _, count in counted), band)
-    first = counted[0][0]
+    behind = run.part(slice(first, last))
+    errors = ((block.t, block.nu_d - block.nu) for block in behind.blocks())
+    settled, _ = settling_times(errors, last - first, band)
     return [
-        None if time is None else 0.0 if time == first else round(time - mark.end, 9)
+        None if time is None else 0.0 if time == behind.t[0] else round(time - mark.end, 9)
         for time in settled
     ]
 

@@ -185,6 +185,25 @@ def test_a_repair_keeps_what_stands_around_a_chunk_that_is_too_large(
         assert (tmp_path / found['kept_as']).read_bytes() == data
 
 
+def test_a_repair_says_which_attachment_it_leaves_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(limits, 'LARGEST_CHUNK', 80_000)
+    held = costly_bags.schema(1, 'x/Y') + costly_bags.channel(1, '/x') + costly_bags.message(1)
+    short, long = (record(Attachment(0, 0, f'{n}', '', b'x' * n)) for n in (70_000, 90_000))
+    whole = costly_bags.file_of(short, long, costly_bags.chunk(held))
+    path = tmp_path / 'bag_0.mcap'
+    path.write_bytes(whole)
+    assert recover(tmp_path).document()['files'][0]['state'] == 'healthy'
+    assert path.read_bytes() == whole
+    path.write_bytes(whole[: -len(MAGIC)])
+    old(path)
+    report = recover(tmp_path).document()
+    said = ['was not finished', "attachment '90000' of 90000 bytes is left out"]
+    assert report['files'][0]['faults'] == said
+    assert (report['attachments'], report['messages']) == (['70000'], 1)
+
+
 def test_a_record_that_is_too_large_is_no_damage(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,7 +13,7 @@ from mcap.records import Attachment, Channel, Header, Metadata, Schema, Statisti
 from zstandard import FRAME_HEADER
 
 from auv_analysis.bag.chunks import MessageTable, by_channel
-from auv_analysis.bag.mcap_file import Lost, McapFile, MessageIndex, Read
+from auv_analysis.bag.mcap_file import LongAttachment, Lost, McapFile, MessageIndex, Read
 from auv_analysis.bag.metadata import Definition, FileExtent
 from auv_analysis.bag.step_topics import role_of
 from auv_dynamics.files.errors import InputError
@@ -184,6 +184,7 @@ class Inspection:
         self.header: Header | None = None
         self.spacings: dict[int, Spacing] = {}
         self.attachments: list[str] = []
+        self._too_long: list[str] = []
         self.lost: list[Lost] = []
         self.compression: str | None = None
         self.packed = False
@@ -245,6 +246,8 @@ class Inspection:
                 self.definitions.add(part, trust)
             elif isinstance(part, Attachment):
                 self.attachments.append(part.name)
+            elif isinstance(part, LongAttachment):
+                self._too_long.append(f'attachment {part.name!r} of {part.size} bytes is left out')
             elif isinstance(part, MessageIndex):
                 self._orphans += 0 if has_chunk else part.messages
             elif isinstance(part, Metadata):
@@ -274,7 +277,7 @@ class Inspection:
             expected, size = self.lost[0].limit
             key = f'byte {self.lost[0].start}'
             raise InputError(self.path, key, expected, f'{size}; nothing else is wrong')
-        return list(dict.fromkeys(lost + found))
+        return list(dict.fromkeys(lost + found + (self._too_long if lost or found else [])))
 
 
 @dataclass

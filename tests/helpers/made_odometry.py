@@ -78,9 +78,8 @@ def odometry_log(x: np.ndarray, rate: float = 50.0, latency: float = 0.004) -> O
     stamp = BEGAN + np.round(np.arange(len(x)) * 1e9 / rate).astype(np.int64)
     arrived = stamp + round(latency * 1e9)
     frames = Frames()
-    return OdometryLog(
-        int(arrived[0]), int(arrived[-1]), arrived, stamp, x, {(frames.odom, frames.base): len(x)}
-    )
+    named = {(frames.odom, frames.base): len(x)}
+    return OdometryLog(int(arrived[0]), int(arrived[-1]), arrived, stamp, stamp.copy(), x, named)
 
 
 def healthy(**values: object) -> OdometryLog:

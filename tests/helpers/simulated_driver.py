@@ -125,7 +125,7 @@ class SimulatedDriver:
         x = (*self._pose, *(self._nu + self._bias + noise).tolist())
         frames = Frames()
         ns = self.now_ns()
-        self.buffer.odometry(ns, ns, x, (frames.odom, frames.base), self._k)
+        self.buffer.odometry(ns, ns, ns, x, (frames.odom, frames.base), self._k)
         if self._applied:
             self.buffer.wrench_applied(ns, tuple(tau.tolist()))
 

@@ -236,9 +236,12 @@ def test_what_was_applied_is_heard_by_who_commands() -> None:
             ('/odom', odom, 3), ('/odom', broken, 4), ('/odom', odom, 5),
             ('/wrench_applied', broken, 9), ('/odom', odom, 6), ('/odom', none, 7),
         ):  # fmt: skip
-            take[topic](data, {'publication_sequence_number': number})
+            about = {'publication_sequence_number': number, 'source_timestamp': 10 * number}
+            take[topic](data, about)
+        take['/odom'](odom, {'received_timestamp': 8})
         assert client.log(0).lost == 0
-        assert client.log(0).stamp_ns.tolist() == [1, 1, 1, NO_STAMP]
+        assert client.log(0).stamp_ns.tolist() == [1, 1, 1, NO_STAMP, 1]
+        assert client.log(0).published_ns.tolist() == [30, 50, 60, 70, 8]
         assert client.log(0).unreadable == {'/odom': 1, 'wrench_applied': 1}
     finally:
         client.close()

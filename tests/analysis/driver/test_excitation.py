@@ -109,7 +109,7 @@ def test_a_drift_is_let_pass_and_leaves_the_turning_its_limit(surge, yaw, word: 
 
     def heard(u: float, r: float) -> None:
         for _ in range(RECENT):
-            buffer.odometry(0, 0, (*LEVEL[:7], u, *(4 * [0.0]), r), ('', ''), None)
+            buffer.odometry(0, 0, 0, (*LEVEL[:7], u, *(4 * [0.0]), r), ('', ''), None)
 
     driver = SimulatedDriver()
     driver.buffer, driver.now_ns = buffer, lambda: 0
@@ -125,7 +125,7 @@ def test_silence_is_counted_from_arrivals_whatever_the_stamps_say(arrived, stamp
     driver = SimulatedDriver()
     driver.buffer, driver.now_ns = OdometryBuffer(), lambda: 10**9
     ns = round(arrived * 1e9), round(stamp * 1e9)
-    driver.buffer.odometry(*ns, tuple(LEVEL), ('', ''), None)
+    driver.buffer.odometry(*ns, 0, tuple(LEVEL), ('', ''), None)
     guard = MotionGuard(driver, 0.1, 0.5, lambda: False)
     with pytest.raises(AbortError, match='no odometry') if silent else nullcontext():
         guard.look(0.1)
@@ -136,10 +136,10 @@ def test_a_measurement_that_is_repeated_is_silence() -> None:
     driver.buffer, driver.now_ns = OdometryBuffer(), lambda: now
     guard = MotionGuard(driver, 0.1, 0.5, lambda: False)
     for now, stamp in ((0, 7), (200_000_000, 8), (400_000_000, 8), (700_000_000, 8)):
-        driver.buffer.odometry(now, stamp, tuple(LEVEL), ('', ''), None)
+        driver.buffer.odometry(now, stamp, 0, tuple(LEVEL), ('', ''), None)
         guard.look(0.1)
     now = 701_000_000
-    driver.buffer.odometry(now, 8, tuple(LEVEL), ('', ''), None)
+    driver.buffer.odometry(now, 8, 0, tuple(LEVEL), ('', ''), None)
     with pytest.raises(AbortError, match='no odometry of a new stamp for'):
         guard.look(0.1)
 

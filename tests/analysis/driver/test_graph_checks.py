@@ -144,7 +144,7 @@ def test_every_check_is_made_once_in_the_order_of_the_catalogue() -> None:
 def test_a_driver_that_is_announced_and_mute_fails() -> None:
     silent = healthy()
     silent = type(silent)(silent.began_ns, silent.ended_ns, *(a[:0] for a in (
-        silent.arrived_ns, silent.stamp_ns, silent.x)))  # fmt: skip
+        silent.arrived_ns, silent.stamp_ns, silent.published_ns, silent.x)))  # fmt: skip
     found = found_in(silent, *CHECKS)
     assert found['rate'].verdict == FAIL
     assert 'no odometry came' in found['rate'].found

@@ -233,7 +233,8 @@ def test_the_folder_holds_report_document_and_all_that_was_heard_and_sent(
 def test_a_driver_that_is_not_there_leaves_a_report_as_well(tmp_path: Path, approved) -> None:
     heard = healthy()
     nothing = replace(heard, **{name: getattr(heard, name)[:0] for name in
-                                ('arrived_ns', 'stamp_ns', 'x')}, frames={})  # fmt: skip
+                                ('arrived_ns', 'stamp_ns', 'published_ns', 'x')},
+                      frames={})  # fmt: skip
     evidence = DriverRecord(graph(odom_publishers=()), nothing, Settings(), passive='not asked for')
     findings = judge(evidence)
     write_results(tmp_path, evidence, findings, document_of(evidence, findings))

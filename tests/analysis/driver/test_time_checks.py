@@ -159,11 +159,11 @@ def test_simulated_time_is_compared_with_the_clock() -> None:
 def test_a_buffer_counts_what_the_middleware_numbered_and_lost() -> None:
     buffer = OdometryBuffer()
     for number in (1, 2, 5, 6, 9):
-        buffer.odometry(number, number, (0.0,) * 13, ('a', 'b'), number)
+        buffer.odometry(number, number, number, (0.0,) * 13, ('a', 'b'), number)
     buffer.unreadable('/odom', 10)  # which has arrived
-    buffer.odometry(11, 11, (0.0,) * 13, ('a', 'b'), 11)
+    buffer.odometry(11, 11, 11, (0.0,) * 13, ('a', 'b'), 11)
     assert buffer.log(0, 10).lost == 4
-    buffer.odometry(12, 12, (0.0,) * 13, ('a', 'b'), 1)  # a publisher that was started again
+    buffer.odometry(12, 12, 12, (0.0,) * 13, ('a', 'b'), 1)  # a publisher that was started again
     assert buffer.log(0, 10).lost == 4
     assert len(buffer) == 7
     assert timing_of(buffer.log(0, 10))['gaps'].numbers['lost'] == 4

@@ -140,15 +140,15 @@ class DriverRecord:
     def _poses(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
         """States (n, 13) with an attitude, their rising times and arrivals in ns.
 
-        And whether these times are those of arrival. Of times with gaps, over which nothing can be
-        told, the longest piece.
+        And whether these times are those of publication. Of times with gaps, over which nothing can
+        be told, the longest piece.
         """
         log = self.log
         norm = np.linalg.norm(log.x[:, 3:7], axis=1)
         good = log.finite & (np.abs(norm - 1.0) < UNIT)
         x, stamps, arrived = log.x[good], log.stamp_ns[good], log.arrived_ns[good]
         rise = bool((np.diff(stamps) > 0).all())
-        ns = stamps if rise else arrived
+        ns = stamps if rise else log.published_ns[good]
         newer = np.flatnonzero(np.diff(np.maximum.accumulate(ns), prepend=-1) > 0)
         gaps = np.flatnonzero(np.diff(ns[newer]) > self.settings.gap * NANOSECONDS)
         longest = max(np.split(newer, gaps + 1), key=len)
@@ -162,9 +162,9 @@ class DriverRecord:
     @cached_property
     def motion(self) -> PoseTwist:
         """Pose and twist of the messages that tell them, where they are enough."""
-        x, ns, _, by_arrival = self._poses
+        x, ns, _, by_publication = self._poses
         q = x[:, 3:7] / np.linalg.norm(x[:, 3:7], axis=1, keepdims=True)
-        return PoseTwist((ns - ns[0]) / NANOSECONDS, x[:, :3], q, x[:, 7:], by_arrival)
+        return PoseTwist((ns - ns[0]) / NANOSECONDS, x[:, :3], q, x[:, 7:], by_publication)
 
     @property
     def uncommanded(self) -> np.ndarray:

@@ -148,7 +148,7 @@ class MotionGuard:
             raise KeyboardInterrupt
         newest = self._client.buffer.newest
         if newest is not None and newest[1] != self._stamp:
-            self._heard, self._stamp, _ = newest
+            self._heard, self._stamp = newest
         latest = self._client.now_ns() - self._timeout * NANOSECONDS
         if self._heard < latest:
             repeated = newest is not None and newest[0] >= latest

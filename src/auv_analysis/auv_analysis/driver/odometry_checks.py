@@ -136,8 +136,8 @@ def jumps(evidence: DriverRecord) -> CheckResult:
     speed, turning, acceleration = settings.speed, settings.turning, settings.acceleration
     expected = f'at most {speed:g} m/s and {turning:g} rad/s by the pose, '
     expected += f'{acceleration:g} m/s2 and rad/s2 by the twist'
-    if motion.by_arrival:
-        why = 'the stamps do not rise, and times of arrival are no measure of a step'
+    if motion.by_publication:
+        why = 'the stamps do not rise, and times of publication are no measure of a step'
         return unchecked(expected, why)
     apart = np.diff(motion.t)[:, None]
     steps = np.diff(motion.p, axis=0)

@@ -28,6 +28,7 @@ class OdometryLog:
     ----------
     began_ns, ended_ns : the window, of this machine's clock
     arrived_ns, stamp_ns : (n,) time of arrival by that clock, and header.stamp, or NO_STAMP
+    published_ns : (n,) when it was published, by the clock of its publisher
     x : (n, 13) position in m, quaternion w, x, y, z, velocity in m/s and rad/s, as they were sent,
         but finite numbers within HUGE
     frames : (header.frame_id, child_frame_id) -> in how many messages
@@ -42,6 +43,7 @@ class OdometryLog:
     ended_ns: int
     arrived_ns: np.ndarray
     stamp_ns: np.ndarray
+    published_ns: np.ndarray
     x: np.ndarray
     frames: Mapping[tuple[str, str], int] = field(default_factory=dict)
     lost: int = 0
@@ -66,7 +68,7 @@ class OdometryBuffer:
     """Takes what arrives, message by message."""
 
     def __init__(self) -> None:
-        self._odometry: list[tuple[int, int, State]] = []
+        self._odometry: list[tuple[int, int, int, State]] = []
         self._frames: Counter[tuple[str, str]] = Counter()
         self._clock: list[tuple[int, int]] = []
         self._applied: list[tuple[int, State]] = []
@@ -78,24 +80,25 @@ class OdometryBuffer:
         return len(self._odometry)
 
     @property
-    def newest(self) -> tuple[int, int, State] | None:
-        """Arrival in ns, stamp in ns and state (13 floats) of the last odometry."""
-        return self._odometry[-1] if self._odometry else None
+    def newest(self) -> tuple[int, int] | None:
+        """Arrival and stamp of the last odometry, ns."""
+        return self._odometry[-1][:2] if self._odometry else None
 
     def recent(self, count: int) -> np.ndarray:
         """States (up to count, 13) of the last messages."""
-        return _states(row[2] for row in self._odometry[-count:])
+        return _states(row[-1] for row in self._odometry[-count:])
 
     def odometry(
         self,
         arrived: int,
         stamp: int,
+        published: int,
         x: State,
         frames: tuple[str, str],
         number: int | None,
     ) -> None:
         """Take an odometry; `number` is the middleware's, of its publisher."""
-        self._odometry.append((arrived, stamp, x))
+        self._odometry.append((arrived, stamp, published, x))
         self._frames[frames] += 1
         self._follow(number)
 
@@ -120,13 +123,15 @@ class OdometryBuffer:
 
     def log(self, began_ns: int, ended_ns: int) -> OdometryLog:
         """All that was taken, as the log of a window."""
-        arrived, stamps, states = zip(*self._odometry, strict=True) if self else ((), (), ())
+        *times, states = zip(*self._odometry, strict=True) if self else ((), (), (), ())
+        arrived, stamps, published = np.array(times, np.int64)
         clock = np.array(self._clock, np.int64).reshape(-1, 2)
         return OdometryLog(
             began_ns,
             ended_ns,
-            np.array(arrived, np.int64),
-            np.array(stamps, np.int64),
+            arrived,
+            stamps,
+            published,
             _states(states),
             dict(self._frames),
             self._lost,

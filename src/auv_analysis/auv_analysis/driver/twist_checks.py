@@ -131,8 +131,8 @@ def _frame(evidence: DriverRecord, half: str, unit: str, expected: str) -> Check
         advice = 'have the driver give a position while it is checked'
         return unchecked(expected, found, advice, **numbers)
     by = ''
-    if motion.by_arrival:
-        by = ' (by the times of arrival, since the stamps do not rise)'
+    if motion.by_publication:
+        by = ' (by the times of publication, since the stamps do not rise)'
     if not fit.right:
         if not (_moves(evidence, half) or (fit.best != CHILD and fit.off[fit.best] <= FITS)):
             why = f'moved too little beside what it wanders at rest: {_speeds(fit, unit)}'

@@ -41,7 +41,7 @@ class PoseTwist:
     p : (n, 3) position, m
     q : (n, 4) unit quaternion w, x, y, z
     nu : (n, 6) twist, m/s and rad/s
-    by_arrival : times are those of arrival, since the stamps do not rise
+    by_publication : times are those of publication, since the stamps do not rise
 
     """
 
@@ -49,7 +49,7 @@ class PoseTwist:
     p: np.ndarray
     q: np.ndarray
     nu: np.ndarray
-    by_arrival: bool = False
+    by_publication: bool = False
 
     @cached_property
     def turned(self) -> np.ndarray:

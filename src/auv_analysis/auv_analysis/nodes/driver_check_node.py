@@ -92,7 +92,9 @@ class CheckNode(BulkNode):
             stamp = first_stamp(data, self.odom)
         except interface.BadMessageError:
             stamp = NO_STAMP
-        self.buffer.odometry(_arrived(info), stamp, x, frames, number)
+        arrived = _arrived(info)
+        published = info.get('source_timestamp') or arrived
+        self.buffer.odometry(arrived, stamp, published, x, frames, number)
 
     def _on_clock(self, data: bytes, info: dict[str, Any]) -> None:
         self.buffer.clock(_arrived(info), first_stamp(data, topics.CLOCK.name))

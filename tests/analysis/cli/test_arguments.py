@@ -1,10 +1,11 @@
-"""The command line's grammar: what numbers, names and topics are taken, defaults, refusals."""
+"""The command line: what numbers, names and topics are taken, defaults, refusals, output."""
 
 import argparse
 import importlib
 import io
 import math
 import re
+import subprocess
 import sys
 from argparse import Namespace
 
@@ -137,3 +138,25 @@ def test_a_ctrl_c_before_the_command_has_begun_is_one_line(program, raised, last
     importlib.reload(cli)
     sys.excepthook(type(raised), raised, None)
     assert said.getvalue() == f'{last}\n'
+
+
+NOISY = """
+import os
+from types import SimpleNamespace
+from auv_analysis.cli import main
+def run(_):
+    os.write(1, b'noise')
+    return {'a': 1}
+main._module = lambda _: SimpleNamespace(add_arguments=lambda _: None, run=run)
+main.main(['info', '--json'])
+"""
+
+
+@pytest.mark.parametrize(('closed', 'errors'), [('', 'noise'), (' 2>&-', '')])
+def test_a_json_document_has_standard_output_for_itself(closed: str, errors: str) -> None:
+    """Also where a library in C prints to it, as Fast DDS does."""
+    line = ['sh', '-c', f'"$0" -c "$1"{closed}', sys.executable, NOISY]
+    done = subprocess.run(line, capture_output=True, text=True, check=True)
+    assert done.stdout.endswith('{"a": 1}\n')
+    assert done.stdout.removesuffix('{"a": 1}\n') == ('' if errors else 'noise')
+    assert done.stderr == errors

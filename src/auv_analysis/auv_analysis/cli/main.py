@@ -158,6 +158,8 @@ def _work(command: Callable[..., dict[str, Any]], options: Any) -> None:
     from auv_analysis.output.parallel import a_copy_beside
     from auv_dynamics.files.errors import FailedError
 
+    if options.json:
+        _keep_stdout()
     try:
         with a_copy_beside():
             document = command(options)
@@ -166,6 +168,14 @@ def _work(command: Callable[..., dict[str, Any]], options: Any) -> None:
         if error.document is not None:
             _print(options, error.document)
         raise
+
+
+def _keep_stdout() -> None:
+    """Leave standard output to the document: libraries such as Fast DDS print to it as well."""
+    if sys.stdout is not None and sys.stdout is sys.__stdout__:
+        sys.stdout = os.fdopen(os.dup(1), 'w', encoding=sys.stdout.encoding)
+        with suppress(OSError):  # standard error was closed
+            os.dup2(2, 1)
 
 
 def _print(options: Any, document: dict[str, Any]) -> None:

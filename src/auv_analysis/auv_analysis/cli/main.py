@@ -172,7 +172,7 @@ def _work(command: Callable[..., dict[str, Any]], options: Any) -> None:
 
 def _keep_stdout() -> None:
     """Leave standard output to the document: libraries such as Fast DDS print to it as well."""
-    if sys.stdout is not None and sys.stdout is sys.__stdout__:
+    if sys.stdout is sys.__stdout__ and sys.stdout is not None:  # nor closed, nor replaced
         sys.stdout = os.fdopen(os.dup(1), 'w', encoding=sys.stdout.encoding)
         with suppress(OSError):  # standard error was closed
             os.dup2(2, 1)

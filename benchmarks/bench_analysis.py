@@ -17,8 +17,8 @@ from auv_analysis import simulate
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
 from auv_analysis.metrics.energy import kinetic_energy
 from auv_analysis.metrics.moments import Tally
+from auv_analysis.metrics.settling import TRANSIENT
 from auv_analysis.metrics.signals import DELTA_PI, DELTA_XI, ENERGY, ERROR, LUMPED, TAU, maps_of
-from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.runs.run import Run
 from auv_gvc_controller.laws.model import ControlModel, control_model
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.metrics.summary import BAND, SMALLEST_BAND, TRANSIENT
+from auv_analysis.metrics.settling import BAND, SMALLEST_BAND, TRANSIENT
 from auv_analysis.scenario.scenario import Scenario
 from auv_dynamics.kernel.integrator import TABLEAUS, stage_times
 from auv_dynamics.plant.plant import initial_state

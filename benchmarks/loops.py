@@ -8,7 +8,7 @@ import numpy as np
 from c_reference import Loops, loops, plants
 
 from auv_analysis import load_scenario
-from auv_analysis.metrics.summary import band_of
+from auv_analysis.metrics.settling import band_of
 from auv_analysis.scenario.changes import changed_scenario, split
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.batch import Batch

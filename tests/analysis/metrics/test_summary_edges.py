@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.metrics.summary import estimate_figures, settling_time
+from auv_analysis.metrics.summary import estimate_figures
 
 
 @pytest.fixture(scope='module')
@@ -44,19 +44,6 @@ def test_the_transient_is_two_seconds_from_the_first_sample(run, start):
     assert summarize(replace(run, t=start + 99.9 * run.t))['velocity_error'][
         'max_after_2s'
     ] == pytest.approx(error[3:].max(axis=0), rel=1e-12)
-
-
-@pytest.mark.parametrize('axis', range(6))
-def test_each_axis_settles_by_itself(axis):
-    t, nu_d, error = 3.0 + np.arange(13.0), np.zeros((13, 6)), np.zeros((13, 6))
-    nu_d[2, axis] = 1.0
-    error[1, axis] = 0.021
-    expected = [3.0] * 6
-    expected[axis] = 5.0
-    assert settling_time(t, error, nu_d) == expected
-    error[-1, axis] = -0.021
-    expected[axis] = None
-    assert settling_time(t, error, nu_d) == expected
 
 
 def test_the_settling_time_of_a_part_counts_from_its_first_sample(run):

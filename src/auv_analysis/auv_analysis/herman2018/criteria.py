@@ -16,7 +16,7 @@ from auv_analysis.herman2018.evidence import (
     spell,
 )
 from auv_analysis.metrics.energy import shares
-from auv_analysis.metrics.summary import TRANSIENT
+from auv_analysis.metrics.settling import TRANSIENT
 from auv_analysis.report.digest import NEAR_ZERO, RunDigest, last_third
 from auv_dynamics.vehicle import DOFS
 

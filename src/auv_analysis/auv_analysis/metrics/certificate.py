@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from auv_analysis.metrics.settling import TRANSIENT
 from auv_analysis.runs.run import BLOCK, Run, rows_of
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import ControlModel
@@ -223,7 +224,6 @@ def size(a: np.ndarray) -> np.ndarray:
 
 
 BOUND_TOLERANCE = 1e-6  # of max abs((26)): allows for truncation in the measured L_dot
-TRANSIENT = 2.0 - 1e-9  # s, which the paper leaves out of its errors
 MARGIN = NODES - 1  # samples about a block with which its derivatives are those of the whole run
 SPARSE = 1.5  # steps: samples that are further apart are not all that the law had
 KEPT = 1 << 16  # samples outside the bound, as far as one can say before the end
@@ -312,7 +312,7 @@ class CertificateFigures:
     """
 
     def __init__(self, start: float, largest: float | None = None):
-        self._late = start + TRANSIENT
+        self._late = start + TRANSIENT - 1e-9
         self._known, self.unsettled = largest, False
         self._count = self._increasing = self._condition = 0
         self._squares = np.zeros(2)  # of the residual and of (26)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.metrics.settling import TRANSIENT, band_of, settling_times
 from auv_analysis.metrics.statistics import Part, Statistics
-from auv_analysis.metrics.summary import TRANSIENT, band_of, settling_times
 from auv_analysis.runs.run import Run, RunInfo
 from auv_analysis.scenario.fault_words import Mark
 from auv_dynamics.vehicle import DOFS

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from auv_analysis.metrics.quantities import HALVES, METRICS
-from auv_analysis.metrics.summary import SETTLED
+from auv_analysis.metrics.settling import SETTLED
 from auv_dynamics.vehicle import DOFS
 
 MATRICES = ('gains.K_D', 'gains.K_f')

@@ -7,7 +7,7 @@ documents, so that `quantity('velocity_error.rms.surge')` describes the column o
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from auv_analysis.metrics.summary import SETTLED, TRANSIENT
+from auv_analysis.metrics.settling import SETTLED, TRANSIENT
 from auv_analysis.output.text import GAINS
 from auv_dynamics.vehicle import DOFS
 

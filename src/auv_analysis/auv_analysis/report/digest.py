@@ -9,8 +9,9 @@ import numpy as np
 from auv_analysis.metrics.certificate import LAWS, certificate_blocks
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
 from auv_analysis.metrics.energy import kinetic_energy, shares
+from auv_analysis.metrics.settling import TRANSIENT, has_settled
 from auv_analysis.metrics.statistics import Part, Statistics
-from auv_analysis.metrics.summary import ENERGY_WINDOW, TRANSIENT, has_settled
+from auv_analysis.metrics.summary import ENERGY_WINDOW
 from auv_analysis.report.traces import Line, Trace, broken
 from auv_analysis.runs.run import Extent, Run, RunInfo
 from auv_gvc_controller.laws.model import ControlModel, control_model

@@ -19,7 +19,7 @@ from auv_analysis.metrics.fault_response import (
     responses,
 )
 from auv_analysis.metrics.quantities import SIGNALS
-from auv_analysis.metrics.summary import BAND_TEXT, TRANSIENT
+from auv_analysis.metrics.settling import BAND_TEXT, TRANSIENT
 from auv_analysis.output.new_files import write_table
 from auv_analysis.output.text import Maths, capital, join, number
 from auv_analysis.report import plots

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from auv_analysis.metrics.quantities import SIGNALS
-from auv_analysis.metrics.summary import TRANSIENT
+from auv_analysis.metrics.settling import TRANSIENT
 from auv_analysis.report.digest import ESTIMATES, RunDigest
 from auv_analysis.report.plots import COLOURS, GREY, moving, unrecorded
 from auv_analysis.report.traces import broken, thinned

@@ -14,8 +14,8 @@ from auv_analysis.metrics.coupling import structural_zeros
 from auv_analysis.metrics.energy import shares
 from auv_analysis.metrics.lyapunov import OF_THE_MOTION
 from auv_analysis.metrics.quantities import SIGNALS, VELOCITY, Quantity
+from auv_analysis.metrics.settling import BAND_TEXT, DWELL, TRANSIENT, band_of
 from auv_analysis.metrics.statistics import Part
-from auv_analysis.metrics.summary import BAND_TEXT, DWELL, TRANSIENT, band_of
 from auv_analysis.output.text import join, number
 from auv_analysis.report import plots
 from auv_analysis.report.digest import ESTIMATES, FOREVER, RunDigest, alike, common_window, digests

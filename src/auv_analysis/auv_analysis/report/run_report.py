@@ -10,7 +10,7 @@ import numpy as np
 
 from auv_analysis.metrics.authority import beyond_authority
 from auv_analysis.metrics.quantities import VELOCITY, WRENCH
-from auv_analysis.metrics.summary import band_of
+from auv_analysis.metrics.settling import band_of
 from auv_analysis.output.parallel import meanwhile
 from auv_analysis.output.text import fixed, join, largest, number, plain, residuals
 from auv_analysis.report import run_tables as tables

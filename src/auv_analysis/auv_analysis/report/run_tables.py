@@ -7,7 +7,7 @@ import numpy as np
 
 from auv_analysis.metrics.coupling import input_deformation, velocity_deformation
 from auv_analysis.metrics.quantities import METRICS, SIGNALS, VELOCITY, WRENCH, Quantity
-from auv_analysis.metrics.summary import TRANSIENT
+from auv_analysis.metrics.settling import TRANSIENT
 from auv_analysis.output.text import join, number, plain
 from auv_analysis.report.results import (
     Column,

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.metrics.lyapunov import OF_THE_MOTION
-from auv_analysis.metrics.summary import SMALLEST_BAND
+from auv_analysis.metrics.settling import SMALLEST_BAND
 from auv_analysis.output.text import Maths, join, number
 from auv_analysis.report.digest import RunDigest, alike, same_vehicle
 from auv_dynamics.files.shipped import shipped_names

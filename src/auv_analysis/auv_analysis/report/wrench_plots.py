@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from auv_analysis.metrics.quantities import SIGNALS, WRENCH
-from auv_analysis.metrics.summary import TRANSIENT
+from auv_analysis.metrics.settling import TRANSIENT
 from auv_analysis.output.text import join, largest, number
 from auv_analysis.report import plots
 from auv_analysis.report.digest import RunDigest

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_analysis.metrics.energy import shares
+from auv_analysis.metrics.settling import TRANSIENT, has_settled
 from auv_analysis.metrics.signals import signals
-from auv_analysis.metrics.summary import TRANSIENT, has_settled
 from auv_analysis.simulation.closed_loop import Sample
 from auv_dynamics.files.yaml_files import LARGEST
 from auv_dynamics.kernel.compile import helper

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.metrics.summary import band_of
+from auv_analysis.metrics.settling import band_of
 from auv_analysis.runs.run import Hold
 from auv_analysis.scenario.changes import changed_scenario, check_paths
 from auv_analysis.scenario.scenario import Scenario

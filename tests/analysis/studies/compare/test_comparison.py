@@ -12,7 +12,7 @@ from pyarrow import csv, parquet
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.metrics.measures import MEASURES
-from auv_analysis.metrics.summary import band_of
+from auv_analysis.metrics.settling import band_of
 from auv_analysis.report.digest import digest
 from auv_analysis.studies.compare import plots
 from auv_analysis.studies.compare.ranking import Entry, comparison_table, rank, write_table

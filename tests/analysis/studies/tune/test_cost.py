@@ -7,7 +7,7 @@ from helpers.tunings import GVC, scenario
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.metrics.quantities import COSTS
-from auv_analysis.metrics.summary import band_of
+from auv_analysis.metrics.settling import band_of
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.simulation.closed_loop import Sample
 from auv_analysis.studies.tune.cost import (

@@ -9,7 +9,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from auv_analysis.metrics.summary import BAND_TEXT, DWELL, band_of
+from auv_analysis.metrics.settling import BAND_TEXT, DWELL, band_of
 from auv_analysis.output.arrow import pa
 from auv_analysis.report import plots
 from auv_analysis.report.digest import RunDigest

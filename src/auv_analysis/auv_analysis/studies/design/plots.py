@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.metrics.summary import TRANSIENT
+from auv_analysis.metrics.settling import TRANSIENT
 from auv_analysis.output.text import Maths
 from auv_analysis.report import plots as plotting
 from auv_analysis.report.digest import RunDigest, digests

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_analysis.metrics.summary import TRANSIENT, has_settled, settling_time
+from auv_analysis.metrics.settling import TRANSIENT, has_settled, settling_time
 from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.batch import run_batch

@@ -380,6 +380,7 @@ LEFT = {'disturbance': [{'kind': 'model_error', 'damping': -0.6, 'mass': -0.5}, 
     ('changes', 'base', 'key'),
     [
         ({'vehicle': [1.0]}, {}, 'vehicle'),
+        ({'controllers': [1.0]}, {}, 'controllers'),
         ({'seed': [-1]}, LATE, 'seed'),
         ({'seed': [1.5]}, LATE, 'seed'),
         ({'seed': np.array([1 << 63], np.uint64)}, LATE, 'seed'),

@@ -53,10 +53,10 @@ def in_columns(scenario: Scenario, controller: str, path: str, values: np.ndarra
     values : (B, ...) that stand there
 
     """
-    if values.dtype.kind not in 'iuf' or path == 'vehicle':
-        return False
     keys = split(path)
     head, rest = keys[0], keys[1:]
+    if values.dtype.kind not in 'iuf' or not rest:
+        return head == 'seed' and _are_seeds(values)
     if head == 'controllers':
         return rest[0] == controller and _gain_fits(scenario, controller, rest[1:], values)
     if head == 'vehicle':
@@ -65,9 +65,7 @@ def in_columns(scenario: Scenario, controller: str, path: str, values: np.ndarra
         return values.ndim == 1 and _error_fits(scenario, rest)
     if head == 'setpoint':
         return values.ndim == 1 and _setpoint_fits(scenario.data['setpoint'], rest)
-    return (head == 'seed' and _are_seeds(values)) or (
-        head == 'initial' and _fits(scenario.data, keys, values, ())
-    )
+    return head == 'initial' and _fits(scenario.data, keys, values, ())
 
 
 def _are_seeds(values: np.ndarray) -> bool:

@@ -500,6 +500,8 @@ def test_other_wrong_arguments():
         rollouts(GVC, 'lqr', {})
     with pytest.raises(ValueError, match='as many values'):
         rollouts(GVC, 'gvc', {'duration': [0.1], 'initial.nu[0]': [0.1, 0.2]})
+    with pytest.raises(ValueError, match="hold: expected continuous or zoh, found 'foh'"):
+        rollouts(GVC, 'gvc', {}, hold='foh')
     sensed = scenario_of('gvc', sensors=NOISY)
     with pytest.raises(InputError, match='zoh'):
         rollouts(sensed, 'gvc', {})

@@ -54,7 +54,7 @@ def rollouts(
     Raises
     ------
     InputError : no such controller or path; actuators, sensors or faults, hold 'continuous'
-    ValueError : values of different lengths
+    ValueError : values of different lengths, no such hold
 
     """
     scenario.controller(controller)

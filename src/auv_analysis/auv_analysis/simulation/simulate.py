@@ -60,10 +60,8 @@ def simulate(scenario: Scenario, controller: str, hold: Hold = 'continuous') -> 
     DivergedError : a value stopped being finite; the text says when
 
     """
-    if hold not in HOLDS:
-        raise ValueError(f'hold: expected {" or ".join(HOLDS)}, found {hold!r}')
-    gains = scenario.gains(controller)
     check_hold(scenario, hold)
+    gains = scenario.gains(controller)
     log = Log.empty(scenario.steps, type(gains).STATES)
     nu_d_dot = _run_kernel(scenario, controller, hold, gains, log)
     t = np.arange(scenario.steps + 1) * scenario.step
@@ -94,7 +92,9 @@ def simulate(scenario: Scenario, controller: str, hold: Hold = 'continuous') -> 
 
 
 def check_hold(scenario: Scenario, hold: Hold) -> None:
-    """Raise InputError where the scenario has something that acts on samples only."""
+    """Raise ValueError for no such hold, InputError where something acts on samples only."""
+    if hold not in HOLDS:
+        raise ValueError(f'hold: expected {" or ".join(HOLDS)}, found {hold!r}')
     if hold == 'continuous' and scenario.sampled:
         expected = "hold 'zoh' (--hold zoh): they act on samples"
         raise InputError(scenario.path, scenario.sampled[0], expected, "hold 'continuous'")

@@ -48,6 +48,11 @@ def written(tmp_path, content):
     return path
 
 
+OFF_CENTRE = {
+    'center_of_gravity': [0.0, 0.0, 1.0], 'inertia_reference': 'co',
+    'inertia': np.diag([1000.0, 2500.0, 100.0]).tolist(),
+}  # fmt: skip
+
 ERRORS = {
     'M not positive definite': (
         without_inertia(matrix(5, 5, -2.0)), 'inertia_matrix',
@@ -79,6 +84,9 @@ ERRORS = {
     'inertia indefinite': (
         changed('rigid_body.inertia', np.diag([-1.0, 2.0, 2.0]).tolist()), 'rigid_body.inertia',
         'a positive definite tensor', 'principal moments -1, 2, 2 about the centre of gravity'),
+    'inertia about the origin, less than that of its mass there': (
+        changed('rigid_body', BASE['rigid_body'] | OFF_CENTRE), 'rigid_body.inertia',
+        'a positive definite tensor', 'principal moments -862.9, 100, 637.1 about'),
     'inertia asymmetric': (
         changed('rigid_body.inertia', [[5, 0.1, 0], [0, 5, 0], [0, 0, 5]]), 'rigid_body.inertia',
         'a symmetric matrix', '[0][1] = 0.1 against [1][0] = 0'),

@@ -116,8 +116,9 @@ def test_between_tabulated_voltages_thrust_is_linear_at_each_command():
 
 def test_beyond_the_tables_thrust_goes_by_the_square_of_the_voltage():
     nominal = load_curve('t200_16v')
-    found = at_voltage(nominal, 16.0, 8.0).thrusts
-    assert_allclose(found, load_curve('t200_10v').thrusts * 0.64, rtol=1e-12)
+    for voltage, end, share in ((8.0, 't200_10v', 0.64), (25.0, 't200_20v', 1.5625)):
+        found = at_voltage(nominal, 16.0, voltage).thrusts
+        assert_allclose(found, load_curve(end).thrusts * share, rtol=1e-12)
     alone = rotors_of(changed({'curve': TABLE, 'voltage': 24.0}))[1].curve
     assert_allclose(at_voltage(alone, 24.0, 12.0).thrusts, [-15.0, 0.0, 0.0, 20.0])
 

@@ -81,6 +81,7 @@ def test_a_measured_curve_may_fall_by_its_noise_only(tmp_path):
 def test_a_curve_without_a_dead_band_crosses_zero_at_its_command():
     curve = ThrusterCurve('x', 'command', np.array([-1.0, 1.0]), np.array([-1.0, 3.0]))
     assert curve.dead_band == (-0.5, -0.5)
+    assert curve.thrust(0.0) == 1.0  # no pulse is of pulse widths alone
     assert_allclose(curve.command(np.array([-0.5, 0.0, 1.0])), [-0.75, -0.5, 0.0])
 
 
@@ -100,6 +101,8 @@ def test_a_curve_without_a_dead_band_crosses_zero_at_its_command():
             r'from astern or zero to ahead, found \[2.0, -2.0\]',
         ),
         ('pwm_us,thrust_n\n1100,0\n1900,0\n', 'from astern or zero to ahead'),
+        ('pwm_us,thrust_n\n1100,1\n1900,2\n', 'from astern or zero to ahead'),
+        ('pwm_us,thrust_n\n1100,-2\n1900,-1\n', 'from astern or zero to ahead'),
     ],
 )
 def test_tables_that_are_no_curve(tmp_path, text, expected):

@@ -171,8 +171,12 @@ def test_the_command_of_a_thrust_gives_another_one_at_another_voltage(voltage):
         assert found[2] == pytest.approx(4 * given_, rel=1e-9)
 
 
-def test_the_square_law_goes_by_the_square_of_the_voltage():
-    plainly = vehicle_with({'voltage': 15.0})
+TABLE = {'command': [-1.0, 1.0], 'thrust_n': [-60.0, 80.0]}  # without a row of no thrust
+
+
+@pytest.mark.parametrize('curve', [{}, {'curve': TABLE}])
+def test_the_square_law_goes_by_the_square_of_the_voltage(curve):
+    plainly = vehicle_with({'voltage': 15.0, **curve})
     assert_allclose(steady({'voltage': 12.0}, TAU, plainly), 0.64 * TAU, atol=1e-9)
 
 

@@ -96,11 +96,6 @@ class Faults:
         """Whether any of them stands between the command and the applied wrench."""
         return bool(self.of(*ACTING))
 
-    @property
-    def random(self) -> bool:
-        """Whether the seed matters to any of them."""
-        return any(fault.spec.get('probability', 1.0) < 1.0 for fault in self.of(*RANDOM))
-
     def delay_of(self, fault: Fault) -> int:
         """Steps that a `sensor_delay` takes."""
         return round(fault.spec['delay'] / self.step)

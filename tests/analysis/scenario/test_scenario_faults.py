@@ -70,6 +70,12 @@ def test_what_is_between_law_and_vehicle(tmp_path, faults, changes, senses, acts
             'axis yaw stuck at one value and with no other fault',
             'faults[0] as well',
         ),
+        (
+            [{'kind': 'thruster', 'thruster': 0, 'stuck': 1.0}, DEAD],
+            'faults[1]',
+            'thruster T1 stuck at one value and with no other fault',
+            'faults[0] as well',
+        ),
         ([{**DEAD, 'thruster': 8}], 'faults[0].thruster', 'an index below 8', '8'),
         ([{**DEAD, 'thruster': 'T33'}], 'faults[0].thruster', 'nearest: ', 'T33'),
         ([DEAD, {**DEAD, 'efficiency': 2}], 'faults[1].efficiency', 'a number from 0 to 1', '2'),
@@ -108,14 +114,14 @@ def test_a_thruster_that_takes_no_part_cannot_fail(tmp_path, changes, expected):
     assert expected in caught.value.expected
 
 
-def test_faults_of_one_kind_may_follow_each_other(tmp_path):
-    faults = [{**DELAY, 'to': 1.0}, {**DELAY, 'from': 1.0, 'delay': 0.2}, WEAK, {**WEAK, 'to': 1.0}]
-    scenario = load_scenario(written(tmp_path, faults))
-    assert [(one.first, one.end) for one in scenario.faults.entries[:2]] == [
-        (0, 100),
-        (100, 1 << 62),
-    ]
-    assert scenario.faults.shape == (True, 20)
+def test_faults_of_one_kind_may_follow_each_other_in_any_order(tmp_path):
+    delays = [{**DELAY, 'to': 1.0}, {**DELAY, 'from': 1.0, 'delay': 0.2}]
+    for order in (1, -1):
+        faults = [*delays[::order], WEAK, {**WEAK, 'to': 1.0}]
+        found = load_scenario(written(tmp_path, faults)).faults
+        times = [(one.first, one.end) for one in found.entries[:2]]
+        assert times[::order] == [(0, 100), (100, 1 << 62)]
+        assert found.shape == (True, 20)
 
 
 def test_no_faults_are_no_faults(tmp_path):

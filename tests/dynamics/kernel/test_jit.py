@@ -90,28 +90,63 @@ def test_everything_runs_without_numba(tmp_path):
     check_same(run_script(tmp_path, PYTHONPATH=path))
 
 
-def test_compiled_code_is_kept_in_a_folder_of_these_sources(tmp_path, monkeypatch):
+@pytest.fixture
+def made_up(tmp_path, monkeypatch):
+    """A package with a module `inner` and one that no kernel imports; the cache beside it."""
     package = tmp_path / 'auv_made_up'
     package.mkdir()
-    (package / '__init__.py').write_text('A = 1\n', encoding='utf-8')
-    (package / 'inner.py').write_text('B = 1\n', encoding='utf-8')
-    (package / 'other.py').write_text('C = 1\n', encoding='utf-8')
-    kernel = 'from auv_made_up import inner\n\n\n@compiled\ndef f():\n    return inner.B\n'
-    (package / 'kernel.py').write_text(kernel, encoding='utf-8')
+    for name, line in (('__init__', 'A = 1'), ('inner', 'B = 1'), ('other', 'C = 1')):
+        (package / f'{name}.py').write_text(f'{line}\n', encoding='utf-8')
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(compile, 'PACKAGES', ('auv_made_up',))
     monkeypatch.delenv('AUV_GVC_CACHE_DIR', raising=False)
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'cache'))
+    return package
+
+
+@pytest.mark.parametrize(
+    'statement',
+    [
+        'from auv_made_up import inner',
+        'from auv_made_up.inner import B',
+        'import auv_made_up.inner',
+        'from auv_made_up import (\n    A,\n    inner,\n)',
+        'def later():\n    from auv_made_up import inner',
+    ],
+)
+def test_compiled_code_is_that_of_all_that_a_kernel_imports(made_up, statement):
+    kernel = f'{statement}\n\n\n@compiled\ndef f():\n    return 1\n'
+    (made_up / 'kernel.py').write_text(kernel, encoding='utf-8')
+    before = compile.cache_folder()
+    (made_up / 'other.py').write_text('C = 2\n', encoding='utf-8')
+    assert compile.cache_folder() == before, 'no kernel depends on it'
+    (made_up / 'inner.py').write_text('B = 2\n', encoding='utf-8')
+    assert compile.cache_folder() != before
+
+
+@pytest.mark.parametrize(
+    'line',
+    [
+        *(f'@{word}' for word in ('compiled', 'helper', 'of_numbers', 'uncached')),
+        "@specialised('record')",
+        '    def wrench(t, nu):',
+        '    def fill_rate(system):',
+        'from numba import types',
+    ],
+)
+def test_a_source_that_compiles_something_is_one_of_them(made_up, line):
+    before = compile.cache_folder()
+    (made_up / 'kernel.py').write_text(f'\n{line}\n', encoding='utf-8')
+    assert compile.cache_folder() != before
+
+
+@pytest.mark.usefixtures('made_up')
+def test_compiled_code_is_kept_in_the_cache_of_the_user(tmp_path, monkeypatch):
     before = compile.cache_folder()
     assert before == compile.cache_folder()
     assert before.parent == tmp_path / 'cache' / 'auv_gvc'
-    (package / 'other.py').write_text('C = 2\n', encoding='utf-8')
-    assert compile.cache_folder() == before, 'no kernel depends on it'
-    (package / 'inner.py').write_text('B = 2\n', encoding='utf-8')
-    assert compile.cache_folder() != before
     monkeypatch.setenv('AUV_GVC_CACHE_DIR', str(tmp_path / 'mine'))
-    assert compile.cache_folder().parent == tmp_path / 'mine'
-    assert compile.cache_folder().name != before.name
+    assert compile.cache_folder() == tmp_path / 'mine' / before.name
 
 
 def test_plain_gives_the_python_function():

@@ -17,6 +17,7 @@ from numpy.testing import assert_array_equal
 import auv_analysis.simulation.rollouts as module
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.simulation import batch
 from auv_analysis.simulation.reduction import COLUMNS
 from auv_analysis.simulation.rollouts import rollouts
 from auv_analysis.simulation.simulate import DivergedError
@@ -255,6 +256,12 @@ def test_no_rollout_depends_on_those_beside_it(rows, threads):
     chosen = {path: column[rows] for path, column in MANY.items()}
     found = rollouts(GVC, 'gvc', chosen, threads=threads)
     equal(found, {name: column[rows] for name, column in ALL.items()})
+
+
+def test_a_long_run_makes_its_tables_anew_for_each_part(monkeypatch):
+    monkeypatch.setattr(batch, 'LISTED', 0)
+    monkeypatch.setattr(batch, 'SHARED_STEPS', 10)
+    equal(rollouts(GVC, 'gvc', MANY, threads=2), ALL)
 
 
 def test_columns_and_scenarios_of_their_own_give_the_same_bits(monkeypatch):

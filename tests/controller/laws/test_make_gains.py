@@ -28,12 +28,34 @@ class Proportional(NamedTuple):
 
 class Half(NamedTuple):
     K: object
+
+
+class Plain:
+    STATES = 0
+    wrench = state_rate = print
+
+
+class Odd(Plain):
+    _fields = 'K'
+
+
+class Bare(Plain):
+    _fields = ('K',)
+
+
+class Strict(Proportional):
+    def check(gains):
+        if gains.K[0] > 9.0:
+            raise ValueError('K: expected 9 at most, found more')
+        if gains.K[0] < 0.0:
+            raise ValueError('the wrong sign')
 """
 
 
 @pytest.fixture
 def own(tmp_path, monkeypatch):
     (tmp_path / 'own_laws.py').write_text(OWN, encoding='utf-8')
+    (tmp_path / 'broken_laws.py').write_text('import math\nmath.missing\n', encoding='utf-8')
     monkeypatch.syspath_prepend(tmp_path)
 
 
@@ -89,8 +111,26 @@ def test_a_law_of_ones_own():
         ('no_such_module:Law', '^expected .* found .*no_such_module'),
         ('own_laws:Missing', '^expected .* found no Missing in own_laws$'),
         ('own_laws:Half', "found 'own_laws:Half' without wrench, state_rate, STATES$"),
+        ('own_laws:Plain', "found 'own_laws:Plain' without _fields$"),
+        ('own_laws:Odd', "found 'own_laws:Odd' without a tuple of _fields$"),
+        ('broken_laws:Law', r"found 'broken_laws:Law' \(AttributeError: .*'missing'\)$"),
     ],
 )
 def test_laws_that_are_refused(name, line):
     with pytest.raises(ValueError, match=line):
         law_class(name)
+
+
+@pytest.mark.usefixtures('own')
+@pytest.mark.parametrize(
+    ('law', 'K', 'line'),
+    [
+        ('Bare', 1.0, '^expected a named tuple of gains, found .own_laws:Bare. .TypeError'),
+        ('Strict', 10.0, '^K: expected 9 at most, found more$'),
+        ('Strict', -1.0, '^expected gains that own_laws:Strict accepts, found the wrong sign$'),
+    ],
+)
+def test_gains_that_a_law_of_ones_own_refuses(law, K, line):
+    with pytest.raises(ValueError, match=line):
+        make_gains(f'own_laws:{law}', {'K': K})
+    assert make_gains('own_laws:Strict', {'K': 2.0}).K[0] == 2.0

@@ -49,12 +49,13 @@ def law_class(name: str) -> Any:
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())  # a user's module may lie where `auv` was started
     try:
-        law = getattr(importlib.import_module(module), attribute)
-    except AttributeError:
-        likely = meant(attribute, dir(sys.modules.get(module)))
-        raise ValueError(f'expected {expected}{likely}, found no {attribute} in {module}') from None
+        found = importlib.import_module(module)
+        law = getattr(found, attribute, None)
     except (Exception, SystemExit) as error:  # whatever a user's module does when it is imported
         raise ValueError(f'expected {expected}, found {name!r} ({named_line(error)})') from None
+    if law is None:
+        likely = meant(attribute, dir(found))
+        raise ValueError(f'expected {expected}{likely}, found no {attribute} in {module}')
     if JITTED and 'numba' in sys.modules:
         load()  # what it compiles by itself may call the kernel's helpers
     missing = [

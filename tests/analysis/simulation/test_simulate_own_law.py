@@ -95,11 +95,17 @@ def test_a_law_of_ones_own_is_plain_python(tmp_path, hold):
 WRONG = {  # what a user's law has wrong -> what the one line says
     'STATES = 6.0': 'STATES a whole number',
     'STATES = -1': 'STATES a whole number',
+    'STATES = True': 'STATES a whole number',
     'INTEGRALS = 30': 'INTEGRALS a multiple of 6',
+    'INTEGRALS = 3': 'INTEGRALS a multiple of 6',
+    'INTEGRALS = -6': 'INTEGRALS a multiple of 6',
     'body_gains = staticmethod(lambda gains, model: (np.eye(3), np.eye(3)))': 'two finite 6x6',
+    'body_gains = staticmethod(lambda *a: np.full((2, 6, 6), np.nan))': 'two finite 6x6',
     'own_rate = staticmethod(lambda gains: "fast")': 'own_rate',
+    'own_rate = staticmethod(lambda gains: np.inf)': 'a finite rate',
     'check = staticmethod(lambda gains: {}["k"])': 'KeyError',
     'wrench = staticmethod(lambda *a: (np.zeros(5), np.zeros(6)))': '6 numbers each',
+    'wrench = staticmethod(lambda *a: (np.zeros(6), np.zeros(5)))': '6 numbers each',
     'wrench = staticmethod(lambda *a: 1 / 0)': 'ZeroDivisionError',
     'state_rate = staticmethod(lambda *a: np.zeros(3))': '6 numbers',
 }

@@ -507,6 +507,9 @@ def test_other_wrong_arguments():
         rollouts(GVC, 'lqr', {})
     with pytest.raises(ValueError, match='as many values'):
         rollouts(GVC, 'gvc', {'duration': [0.1], 'initial.nu[0]': [0.1, 0.2]})
+    for values, found in ((0.1, '0.1'), ('rexrov', "'rexrov'"), (np.array(1.0), 'array')):
+        with pytest.raises(ValueError, match=rf'vehicle: expected a value for each.*{found}'):
+            rollouts(GVC, 'gvc', {'vehicle': values})
     with pytest.raises(ValueError, match="hold: expected continuous or zoh, found 'foh'"):
         rollouts(GVC, 'gvc', {}, hold='foh')
     sensed = scenario_of('gvc', sensors=NOISY)

@@ -54,15 +54,14 @@ def rollouts(
     Raises
     ------
     InputError : no such controller or path; actuators, sensors or faults, hold 'continuous'
-    ValueError : values of different lengths, no such hold
+    ValueError : a single value, values of different lengths, no such hold
 
     """
     scenario.controller(controller)
     check_paths(scenario, changes)
     check_hold(scenario, hold)
-    given = {path: _array(values) for path, values in changes.items()}
-    if seeds is not None:
-        given['seed'] = np.asarray(seeds)
+    asked = changes if seeds is None else {**changes, 'seed': seeds}
+    given = {path: _array(path, values) for path, values in asked.items()}
     count = _count(given)
     result: dict[str, np.ndarray] = {name: np.full(count, np.nan) for name in COLUMNS}
     result |= {'status': np.full(count, 'refused', object), 'reason': np.full(count, '', object)}
@@ -91,8 +90,10 @@ def _run(variants: Variants, hold: Hold, threads: int, result: Mapping[str, np.n
     result['reason'][rows[diverged]] = times
 
 
-def _array(values: Sequence[Any] | np.ndarray) -> np.ndarray:
+def _array(path: str, values: Sequence[Any] | np.ndarray) -> np.ndarray:
     """Numbers, or lists of numbers, as one array; anything else as objects."""
+    if isinstance(values, str) or not np.iterable(values):
+        raise ValueError(f'{path}: expected a value for each rollout, found {values!r}')
     if isinstance(values, np.ndarray):
         return values
     try:

@@ -93,6 +93,7 @@ def require(executable: str) -> None:
     command = [sys.executable, '-c', TRIAL, *arguments]
     tried = subprocess.run(command, capture_output=True, text=True, check=False)
     if tried.returncode != 0:
-        lines = [line for line in tried.stderr.splitlines() if 'Error: ' in line] or ['a crash']
+        errors = [line.partition('Error: ') for line in tried.stderr.splitlines()]
+        said = [text for _, error, text in errors if error] or ['a crash']
         expected = f'a middleware with DDS security, and keys of {arguments[-1]}'
-        raise InputError(f'{ENABLE}=true', '', expected, lines[-1].partition('Error: ')[2])
+        raise InputError(f'{ENABLE}=true', '', expected, said[-1])

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from auv_analysis.metrics.quantities import SIGNALS
 from auv_analysis.output.text import join, number
 from auv_analysis.runs.run import Run
 from auv_dynamics.vehicle import DOFS
@@ -11,7 +12,7 @@ from auv_dynamics.vehicle.thrusters import Thrusters
 from auv_dynamics.vehicle.vehicle import Vehicle
 
 NOTHING = 1e-6  # of the largest command of its kind: rounding
-UNITS = ('N', 'N', 'N', 'N m', 'N m', 'N m')
+INPUT = SIGNALS['tau']
 
 
 def both_ways(run: Run) -> tuple[np.ndarray, np.ndarray]:
@@ -56,7 +57,7 @@ def _without_actuators(thrusters: Thrusters, largest: Sequence[float]) -> Iterat
         i = DOFS.index(dof)
         if largest[i] > NOTHING * max(largest[:3] if i < 3 else largest[3:]):
             apart = f', not apart from {join(list(others))}' if others else ''
-            asked.append(f'{dof} (up to {number(largest[i])} {UNITS[i]}{apart})')
+            asked.append(f'{dof} (up to {number(largest[i])} {INPUT.unit_of(i)}{apart})')
     if asked:
         yield (
             f'{join(asked)} {"is" if len(asked) == 1 else "are"} commanded, which no thruster '
@@ -76,6 +77,6 @@ def _above_thrust(
                  if abs(tau) > abs(most) and tau * most >= 0.0]  # fmt: skip
         if dof not in lost and above:
             tau, most = above[0]
-            asked.append(f'{number(tau)} of at most {number(most)} {UNITS[i]} in {dof}')
+            asked.append(f'{number(tau)} of at most {number(most)} {INPUT.unit_of(i)} in {dof}')
     if asked:
         yield f'more is commanded than the thrusters can give: {join(asked)}'

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.metrics.quantities import SIGNALS
 from auv_analysis.metrics.settling import TRANSIENT, band_of, settling_times
 from auv_analysis.metrics.statistics import Part, Statistics
 from auv_analysis.runs.run import Run, RunInfo
@@ -137,7 +138,7 @@ def fault_rows(found: Mapping[str, Sequence[FaultResponse]]) -> list[dict[str, A
 
 
 def _row(controller: str, response: FaultResponse) -> dict[str, Any]:
-    mark, angular = response.mark, response.dof in DOFS[3:]
+    mark = response.mark
     row: dict[str, Any] = {
         'fault': mark.number,
         'kind': mark.kind,
@@ -147,8 +148,8 @@ def _row(controller: str, response: FaultResponse) -> dict[str, Any]:
         'controller': controller,
         'law': response.law,
         'dof': response.dof,
-        'unit': 'rad/s' if angular else 'm/s',
-        'effort_unit': 'N m' if angular else 'N',
+        'unit': SIGNALS['error'].unit_of(response.dof),
+        'effort_unit': SIGNALS['tau'].unit_of(response.dof),
         'band': response.band,
         'recovery': response.recovery,
         'until': response.until,

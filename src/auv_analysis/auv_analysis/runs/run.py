@@ -3,7 +3,7 @@
 import mmap
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
@@ -53,9 +53,9 @@ class RunInfo(ABC):
     source: str
     hold: str = 'zoh'
     kinds: frozenset[str] | None = None
-    notes: tuple[str, ...] = field(default=())
-    gaps: tuple[tuple[float, float], ...] = field(default=())
-    faults: tuple[Mark, ...] = field(default=())
+    notes: tuple[str, ...] = ()
+    gaps: tuple[tuple[float, float], ...] = ()
+    faults: tuple[Mark, ...] = ()
     unrecorded: frozenset[str] = frozenset()
     acceleration: dict[str, Any] | None = None
 
@@ -138,9 +138,9 @@ class Extent(NamedTuple):
     sensing: bool
     acting: bool
     knows_disturbance: bool
-    knows_setpoint: bool = True
-    knows_wrench: bool = True
-    unknown: tuple[str, ...] = ()
+    knows_setpoint: bool
+    knows_wrench: bool
+    unknown: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)

@@ -95,5 +95,6 @@ def _check_shapes(arrays: dict[str, np.ndarray], path: Path) -> None:
     for name in (*MOTION[1:], *FORCES, *OPTIONAL):
         found = arrays[name].shape if name in arrays else None
         width = found[-1:] if name == 'law_state' and found else (6,)  # a law has its own number
-        if found is not None and found != (*shape, *width):
-            raise InputError(path, name, f'({shape[0]}, 6) numbers', f'shape {found}')
+        expected = (*shape, *width)
+        if found not in (None, expected):
+            raise InputError(path, name, f'{expected} numbers', f'shape {found}')

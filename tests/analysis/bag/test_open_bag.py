@@ -217,6 +217,7 @@ def test_a_short_bag_is_kept_in_memory_and_a_long_one_in_files(tmp_path) -> None
     assert not mapped(open_bag(bag, whole=101).run)
     long = open_bag(bag, whole=100).run
     assert {'t', 'eta', 'nu', 'nu_d', 'nu_d_dot', 'tau'} <= mapped(long)
+    assert not mapped(long.part(slice(0, 10))), 'a copy, so that its pages can go again'
 
 
 def test_no_room_for_the_files_of_a_long_bag(tmp_path, monkeypatch) -> None:

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.block_runs import in_blocks, joined
+from helpers.block_runs import in_blocks
 from helpers.certificates import certificate_of
 from helpers.strategies import examples
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.metrics import certificate
@@ -26,7 +26,6 @@ from auv_analysis.runs.run import Run
 from auv_gvc_controller.laws.model import control_model
 
 quick = examples(10)
-ROWS = st.integers(1, 40) | st.integers(100, 450)
 
 
 @pytest.fixture(scope='module')
@@ -47,20 +46,6 @@ def assert_same_figures(found: Any, expected: Any) -> None:
         assert found == pytest.approx(expected, rel=1e-12)
     else:
         assert found == expected
-
-
-@given(rows=ROWS, margin=st.integers(0, 20), wide=st.booleans())
-@quick
-def test_blocks_are_the_run(run, rows, margin, wide) -> None:
-    if not wide:
-        whole = joined([*run.blocks(rows)])
-    else:
-        parts = [*run.wide_blocks(margin, rows)]
-        whole = joined([block.part(inside) for block, inside in parts])
-        assert all(len(block.t) <= rows + 2 * margin for block, _ in parts)
-    assert whole.arrays().keys() == run.arrays().keys()
-    for name, values in run.arrays().items():
-        assert_array_equal(whole.arrays()[name], values)
 
 
 @given(rows=st.integers(1, 130), blocks=st.floats(0.1, 8))
@@ -181,22 +166,3 @@ def test_without_a_compiler_columns_give_what_samples_give(run) -> None:
         for kind, values in zip(kept, document[name], strict=True):
             expected = getattr(compiled, kind)[kept[kind]]
             assert_allclose(np.array(values)[kept[kind]], expected, rtol=1e-12, atol=1e-12)
-
-
-def test_a_run_is_printed_in_a_line(run: Run) -> None:
-    for one in (run, in_blocks(run, 100)):
-        text = repr(one)
-        assert len(text.splitlines()) == 1
-        assert all(word in text for word in ('case1', 'gvc', 'herman2018', '401 samples', '4 s'))
-
-
-def test_a_run_is_a_data_frame(run: Run) -> None:
-    frame = run.to_pandas()
-    assert frame.index.name == 't'
-    assert_array_equal(frame.index, run.t)
-    assert_array_equal(frame['nu_d_dot.yaw'], run.nu_d_dot[:, 5])
-    assert_array_equal(frame['F.heave'], run.disturbance[:, 2])
-    assert 'applied.surge' not in frame, 'no actuators'
-    devices = replace(run, applied=2 * run.tau, measured=3 * run.nu).to_pandas()
-    assert_array_equal(devices['applied.roll'], 2 * run.tau[:, 3])
-    assert_array_equal(devices['measured.pitch'], 3 * run.nu[:, 4])

@@ -1,4 +1,4 @@
-"""Thinned lines and statistics of a run in blocks: nothing that a reader could see is lost."""
+"""Thinned lines of a run in blocks: nothing that a reader could see is lost."""
 
 import tracemalloc
 from dataclasses import replace
@@ -16,7 +16,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.metrics.energy import kinetic_energy
-from auv_analysis.metrics.statistics import Statistics, followed, part_of
 from auv_analysis.report import plots, run_plots
 from auv_analysis.report.digest import digest, is_split
 from auv_analysis.report.run_report import write_report
@@ -153,32 +152,6 @@ def test_a_report_does_not_grow_with_the_run(run, tmp_path) -> None:
         sizes.append((report.stat().st_size, pdfs))
     assert sizes[1][0] < 1.3 * sizes[0][0]
     assert sizes[1][1] < 1_500_000
-
-
-@given(seed=st.integers(0, 99), n=st.integers(2, 50), cut=st.integers(1, 49))
-@quick
-def test_parts_follow_one_another(seed, n, cut) -> None:
-    t, values = np.arange(n) / 10, np.random.default_rng(seed).normal(size=(n, 3)).round(1)
-    cut = min(cut, n - 1)
-    whole = part_of(t, values)
-    found = followed(part_of(t[:cut], values[:cut]), part_of(t[cut:], values[cut:]))
-    for name in ('count', 'first', 'last', 'low', 'high', 'peak', 'at'):
-        assert_array_equal(getattr(found, name), getattr(whole, name))
-    for name in ('sums', 'squares', 'path', 'mean', 'rms', 'span'):
-        assert_allclose(getattr(found, name), getattr(whole, name), rtol=1e-12, atol=1e-12)
-    assert whole.at.tolist() == [t[i] for i in np.abs(values).argmax(axis=0)]
-    assert_allclose(whole.path, np.abs(np.diff(values, axis=0)).sum(axis=0))
-
-
-def test_statistics_between_cuts() -> None:
-    t, values = np.arange(10.0), np.arange(10.0)[:, None]
-    statistics = Statistics([2.5, 7.0])
-    for i in range(0, 10, 4):
-        statistics.add(t[i : i + 4], values[i : i + 4])
-    assert statistics.between(2.5, 7.0).sums == 3 + 4 + 5 + 6
-    assert statistics.between(7.0).count == 3
-    assert statistics.between(None, 2.5).high == 2
-    assert Statistics([1.0]).between() is None
 
 
 def test_a_sketch_in_blocks_is_that_of_the_whole(run, monkeypatch) -> None:

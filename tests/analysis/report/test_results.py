@@ -10,7 +10,7 @@ import pytest
 from helpers.report_pages import at
 from rich.console import Console
 
-from auv_analysis.metrics.quantities import METRICS, SIGNALS, Quantity, mathtext, quantity
+from auv_analysis.metrics.quantities import Quantity, quantity
 from auv_analysis.output.new_files import known
 from auv_analysis.output.text import MISSING, Maths
 from auv_analysis.report.results import (
@@ -23,7 +23,6 @@ from auv_analysis.report.results import (
     terminal,
     view_of_file,
 )
-from auv_dynamics.vehicle import DOFS
 
 ROWS = [
     {'controller': '<a>', 'effort.rms.surge': 1234.5, 'share': 0.25, 'verdict': 'good', 'n': 3},
@@ -162,18 +161,3 @@ def test_a_view_of_a_file_points_to_the_rows_it_shows() -> None:
 def test_json_knows_no_infinity_and_no_array() -> None:
     found = known({'a': np.array([[1.0, np.nan]]), 'b': (float('inf'), 2), 'c': np.float64(3.0)})
     assert found == {'a': [[1.0, None]], 'b': [None, 2], 'c': 3.0}
-
-
-@pytest.mark.parametrize('name', [*METRICS])
-def test_a_metric_of_a_degree_of_freedom_has_one_unit(name: str) -> None:
-    units = {quantity(f'{name}.{dof}').unit for dof in DOFS}
-    assert all(unit and ',' not in unit for unit in units)
-    assert len(units) == len(set(METRICS[name].units))
-    assert quantity(f'overall.{name}.angular').unit == METRICS[name].units[1]
-
-
-def test_symbols_are_set_for_plots() -> None:
-    assert mathtext('Δξ_1') == r'$\Delta \xi_{1}$'
-    assert mathtext('omega_f') == r'$\omega_{f}$'
-    assert SIGNALS['tau'].axis([0, 2]) == r'$\tau_{X}$, $\tau_{Z}$ (N)'
-    assert quantity('no such column').label == 'no such column'

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.metrics.certificate import (
+    FIGURES,
     Certificate,
     as_figures,
     certificate,
@@ -16,6 +17,7 @@ from auv_analysis.metrics.certificate import (
     sampled_integral,
 )
 from auv_analysis.metrics.lyapunov import lyapunov
+from auv_analysis.runs.run import Run
 from auv_dynamics import load_vehicle
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model
@@ -121,10 +123,15 @@ def test_the_integral_is_the_laws_own_or_that_of_what_it_saw_or_unknown():
     assert integral_of(replace(recorded, hold='continuous')) is None
 
 
-def test_a_run_that_begins_behind_its_law_has_no_certificate() -> None:
+def of_half_a_second() -> Run:
+    """A run as a bag has it, without the state of its law."""
     case = load_scenario('case1')
     short = replace(case, data={**case.data, 'duration': 0.5})
-    whole = replace(simulate(short, 'gvc', 'zoh'), law_state=None)
+    return replace(simulate(short, 'gvc', 'zoh'), law_state=None)
+
+
+def test_a_run_that_begins_behind_its_law_has_no_certificate() -> None:
+    whole = of_half_a_second()
     model = control_model(whole.vehicle)
     assert lyapunov(whole, model)['sup_z'] is not None
     found = lyapunov(whole.part(slice(10, None)), model)
@@ -144,10 +151,28 @@ def test_a_run_that_begins_behind_its_law_has_no_certificate() -> None:
 def test_what_was_there_and_nobody_recorded_breaks_the_identity_as_well(
     signal, words, sup_z
 ) -> None:
-    case = load_scenario('case1')
-    short = replace(case, data={**case.data, 'duration': 0.5})
-    run = replace(simulate(short, 'gvc', 'zoh'), law_state=None)
+    run = of_half_a_second()
     assert lyapunov(run, control_model(run.vehicle))['applicable']
     found = lyapunov(replace(run, unrecorded=frozenset({signal})), control_model(run.vehicle))
     assert (found['applicable'], found['reason'].startswith(words)) == (False, True)
     assert (found['share_bound_28'], found['sup_z'] is not None) == (None, sup_z)
+
+
+LACKS = 'not all velocities, the wrench and the set-point were recorded'
+
+
+@pytest.mark.parametrize(('signal', 'axes'), [('nu', [4]), ('nu_d', range(6)), ('tau', range(6))])
+def test_without_a_velocity_the_set_point_or_the_wrench_there_are_no_figures(signal, axes) -> None:
+    run = of_half_a_second()
+    values = getattr(run, signal).copy()
+    values[:, axes] = np.nan
+    found = lyapunov(replace(run, **{signal: values}), control_model(run.vehicle))
+    assert (found['applicable'], found['reason']) == (False, LACKS)
+    assert {found[name] for name in FIGURES} == {None}
+
+
+def test_across_a_gap_there_are_no_figures() -> None:
+    run = of_half_a_second()
+    found = lyapunov(replace(run, gaps=((0.1, 0.2),)), control_model(run.vehicle))
+    assert found['reason'] == 'the run has gaps, across which nothing has a rate'
+    assert {found[name] for name in FIGURES} == {None}

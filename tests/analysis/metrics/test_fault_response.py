@@ -92,6 +92,12 @@ def test_of_a_fault_that_was_over_before_the_first_sample_nothing_is_known(made)
     assert {(one.rms, one.recovery) for one in of_lost} == {((None, None, None), None)}
 
 
+def test_of_a_fault_that_ended_at_the_first_sample_the_recovery_is_known(made):
+    sway = responses(made.part(made.t > 13.995))[1]
+    assert (sway.rms[:2], sway.until) == ((None, None), 20.0)
+    assert sway.recovery == pytest.approx(1.61)
+
+
 def test_errors_recovery_and_effort(made):
     found = {(one.mark.number, one.dof): one for one in responses(made)}
     sway = found[1, 'sway']
@@ -109,8 +115,11 @@ def test_errors_recovery_and_effort(made):
 
 def test_every_number_is_that_of_its_axis_and_its_time(made):
     error, tau = np.random.default_rng(3).normal(size=(2, len(made.t), 6)) * np.arange(1.0, 7.0)
-    for one in responses(replace(made, nu=made.nu_d - error, tau=tau)):
+    peaks = np.arange(1.0, 7.0)
+    nu_d = np.where(made.t < 25.0, -1.0, 0.5)[:, None] * peaks
+    for one in responses(replace(made, nu_d=nu_d, nu=nu_d - error, tau=tau)):
         i = DOFS.index(one.dof)
+        assert one.band == pytest.approx(0.02 * peaks[i])
         for k, (begin, end) in enumerate(one.windows):
             inside = (made.t >= begin - 1e-6) & (made.t < end - 1e-6)
             found = one.rms[k], one.peak[k], one.effort[k]
@@ -177,6 +186,24 @@ def test_the_worst_fault_is_named(made):
     assert 'disturbs gvc most is number 2' in overview[0]
     assert 'after 1 of the 1 that end' in overview[0]
     assert 'after none of the 1 that end' in overview[1]
+
+
+def test_a_row_says_its_fault_its_axis_its_numbers_and_their_times(made):
+    rows = fault_rows({'mine': responses(made)})
+    about = {
+        'fault': 1, 'kind': 'thruster', 'label': 'thruster T3 lost', 'start': 10.0, 'end': 14.0,
+        'dof': 'sway', 'unit': 'm/s', 'effort_unit': 'N', 'until': 20.0, 'before_from': 6.0,
+        'before_to': 10.0, 'during_from': 10.0, 'during_to': 14.0, 'after_from': 14.0,
+        'after_to': 18.0, 'band': pytest.approx(0.02), 'recovery': pytest.approx(1.61),
+        'rms_before': pytest.approx(0.01), 'rms_during': pytest.approx(0.1),
+        'max_during': pytest.approx(0.1), 'effort_before': pytest.approx(5.0),
+    }  # fmt: skip
+    assert {name: rows[1][name] for name in about} == about
+    last = {
+        'fault': 2, 'start': 20.0, 'end': None, 'dof': 'yaw', 'unit': 'rad/s',
+        'effort_unit': 'N m', 'until': None, 'recovery': None,
+    }  # fmt: skip
+    assert {name: rows[-1][name] for name in last} == last
 
 
 def test_every_number_of_the_tables_is_in_the_file(made, tmp_path):

@@ -1,5 +1,6 @@
 """Commands above the weight, above the thrusters, and where there are none, are remarked on."""
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,6 +13,7 @@ from auv_analysis.metrics.authority import beyond_authority, both_ways
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.vehicle.thrusters import Thrusters
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 
 def test_the_largest_wrench_is_that_of_the_best_thrusts() -> None:
@@ -54,20 +56,33 @@ def test_what_is_remarkable_of_the_largest_commands(largest, words) -> None:
     assert all(word in text for word, text in zip(words, found, strict=True))
 
 
+def with_propeller(reverse: float, forward: float) -> Vehicle:
+    """A vehicle that surges and can do nothing else."""
+    limits = np.array([reverse]), np.array([forward])
+    thrusters = Thrusters(('P',), np.eye(6)[:, :1], *limits)
+    return load_vehicle('rexrov').changed(thrusters=thrusters)
+
+
 @pytest.mark.parametrize(
     ('least', 'most', 'text'),
-    [(-4.0, 24.0, []), (-9.0, 24.0, ['-9.00 of at most -5.00 N in surge']),
+    [(-4.0, 24.0, []), (-5.0, 25.0, []), (-9.0, 24.0, ['-9.00 of at most -5.00 N in surge']),
      (-30.0, 24.0, ['30.0 of at most 25.0 N in surge']),
      (np.nan, np.nan, [])],
 )  # fmt: skip
 def test_a_propeller_weaker_astern_is_judged_astern(least, most, text) -> None:
-    limits = np.array([5.0]), np.array([25.0])
-    thrusters = Thrusters(('P',), np.eye(6)[:, :1], *limits)
-    vehicle = load_vehicle('rexrov').changed(thrusters=thrusters)
+    vehicle = with_propeller(5.0, 25.0)
     ways = [value * np.eye(6)[0] for value in (least, most)]
     largest = [np.nan_to_num(max(abs(least), abs(most))), 0, 0, 0, 0, 0]
     found = beyond_authority(vehicle, largest, ways)
     assert [line.partition('give: ')[2].replace('\N{MINUS SIGN}', '-') for line in found] == text
+
+
+def test_what_no_thruster_gives_is_held_against_commands_of_its_kind() -> None:
+    """5e-6 is rounding beside 10 N and none beside 1 N m."""
+    (text,) = beyond_authority(with_propeller(50.0, 50.0), [10.0, 2.0, 5e-6, 5e-6, 0.0, 1.0])
+    asked = [('sway', 'N'), ('roll', 'N m'), ('yaw', 'N m')]
+    assert re.findall(r'(\w+) \(up to \S+ ([N m]+)\)', text) == asked
+    assert 'are commanded, which no thruster actuates: T has rank 1 of 6' in text
 
 
 def test_both_ways_are_those_of_the_whole_run() -> None:

@@ -19,6 +19,7 @@ from auv_dynamics.ros.interface import (
         (1e-9, 3e-9, 1, 3),
         (0.3, 0.3, 3 * 10**8, 1),
         (0.1, 1e6, 10**8, 10**7),
+        (33935.147, 33935.147, 33_935_147 * 10**6, 1),  # as a float 0.004 ns less
     ],
 )
 def test_a_grid_counts_its_steps_and_has_no_end_without_a_duration(step, duration, step_ns, last):

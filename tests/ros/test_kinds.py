@@ -1,6 +1,8 @@
 """Message types by the name that a publisher gives them."""
 
 import sys
+from contextlib import nullcontext
+from types import SimpleNamespace
 
 import pytest
 from geometry_msgs.msg import WrenchStamped
@@ -13,6 +15,7 @@ from rclpy.qos import (
     ReliabilityPolicy,
 )
 
+from auv_dynamics.ros import rclpy_internals
 from auv_dynamics.ros.topics import best_effort, is_name, message_class, qos_entry, type_name
 
 
@@ -70,3 +73,29 @@ def test_a_profile_is_written_whole() -> None:
         'lifespan': {'sec': 3, 'nsec': 503},
         'liveliness_lease_duration': {'sec': 4, 'nsec': 504},
     }
+
+
+@pytest.mark.parametrize(
+    ('name', 'middleware'),
+    [('HelloWorld', 'rmw_fastrtps_cpp'), ('made_msgs/msg/Up', 'rmw_cyclonedds_cpp')],
+)
+def test_no_stand_in_is_made_of_a_bad_name_or_for_another_middleware(
+    monkeypatch, name: str, middleware: str
+) -> None:
+    """Its type supports are laid out in another way."""
+    identifier = 'get_rmw_implementation_identifier'
+    monkeypatch.setattr(rclpy_internals, identifier, lambda: middleware)
+    with pytest.raises(ImportError, match=f'{name}: expected a message and'):
+        rclpy_internals.raw_class(name)
+
+
+def test_of_what_has_arrived_so_much_is_taken_and_the_rest_stays() -> None:
+    class Handle(nullcontext):
+        def take_message(self, kind: str, raw: bool) -> tuple[str, bool, int] | None:
+            return (kind, raw, arrived.pop(0)) if arrived else None
+
+    arrived = [1, 2, 3]
+    heard = SimpleNamespace(handle=Handle(), msg_type='kind', raw=True)
+    assert rclpy_internals.taken(heard, 2) == [('kind', True, 1), ('kind', True, 2)]
+    assert arrived == [3]
+    assert rclpy_internals.taken(heard, 2) == [('kind', True, 3)]

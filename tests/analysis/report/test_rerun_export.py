@@ -15,8 +15,10 @@ from scipy.spatial.transform import Rotation
 
 from auv_analysis.cli.main import main
 from auv_analysis.report import rerun_export
+from auv_analysis.report.plots import COLOURS, GREY
 from auv_analysis.runs.run import Run
 from auv_dynamics import load_vehicle
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle import DOFS
 
 SAMPLES = 7
@@ -111,6 +113,57 @@ def test_the_file_is_named_as_the_bag(monkeypatch, tmp_path, bag: str, file: str
     monkeypatch.chdir(inner)
     main(['export-rerun', bag])
     assert [path.name for path in tmp_path.rglob('*.rrd')] == [file]
+
+
+def test_a_file_that_cannot_be_is_refused_before_anything_is_written(monkeypatch, tmp_path) -> None:
+    monkeypatch.setattr(rerun_export, 'library', lambda: None)
+    (tmp_path / 'file').touch()
+    with pytest.raises(InputError, match='--out: expected a file that can be written, found '):
+        rerun_export.export(made_run(), tmp_path / 'file' / 'made.rrd')
+
+
+def test_an_export_that_fails_leaves_the_earlier_file_and_no_other(monkeypatch, tmp_path) -> None:
+    def fail(*_: object) -> None:
+        raise MemoryError
+
+    recording = SimpleNamespace(save=lambda *_, **__: None)
+    rerun = SimpleNamespace(RecordingStream=lambda *_, **__: recording)
+    monkeypatch.setattr(rerun_export, 'library', lambda: rerun)
+    monkeypatch.setattr(rerun_export, '_blueprint', lambda: None)
+    monkeypatch.setattr(rerun_export, '_name', fail)
+    path = tmp_path / 'made.rrd'
+    path.write_text('earlier')
+    with pytest.raises(MemoryError):
+        rerun_export.export(made_run(), path)
+    assert [(one.name, one.read_text()) for one in tmp_path.iterdir()] == [('made.rrd', 'earlier')]
+
+
+@pytest.mark.parametrize(('law', 'width'), [('gvc', 2.0), ('cl', 1.0)])
+def test_each_axis_has_its_colour_and_the_set_point_is_grey_and_thin(
+    monkeypatch, law: str, width: float
+) -> None:
+    logged: dict[str, object] = {}
+    rerun = SimpleNamespace(
+        ViewCoordinates=SimpleNamespace(FRD='x north, z down'),
+        SeriesLines=lambda **look: (look['colors'], look['widths']),
+        TransformAxes3D=lambda length: f'{length:g} m',
+        new_entity_path='/'.join,
+    )
+    recording = SimpleNamespace(log=lambda path, what, static: logged.update({path: what}))
+    monkeypatch.setattr(rerun_export, 'library', lambda: rerun)
+    rerun_export._name(recording, replace(made_run(), law=law))
+    expected: dict[str, object] = {
+        'trajectory': 'x north, z down', 'trajectory/my own/vehicle': '1 m',
+    }  # fmt: skip
+    for dof, colour in zip(DOFS, COLOURS, strict=True):
+        for quantity in ('velocity', 'wrench', 'energy_shares'):
+            expected[f'{quantity}/{dof}/my own'] = ([rgb(colour)], [width])
+        expected[f'velocity/{dof}/setpoint'] = ([rgb(GREY)], [1.0])
+    assert logged == expected
+
+
+def rgb(colour: str) -> list[int]:
+    return [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
 
 
 def exported(run: Run, path: Path) -> dict[str, dict[str, list]]:

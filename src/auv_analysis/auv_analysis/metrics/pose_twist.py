@@ -264,8 +264,8 @@ def fit_readings(motion: PoseTwist, readings: Mapping[str, Reading]) -> TwistFit
     by_path, by_twist, _ = right.sizes
     speed = max(by_path, by_twist, TINY)
     constant = (right.path - right.velocity).mean(axis=0)
-    squares = float((right.velocity**2).sum())
-    factor = float((right.path * right.velocity).sum()) / squares if squares else 1.0
+    squares = max(float((right.velocity**2).sum()), TINY)
+    factor = float((right.path * right.velocity).sum()) / squares
     return TwistFit(
         by_path,
         by_twist,

@@ -89,7 +89,7 @@ def time_grid(step: float, duration: float, file: object) -> TimeGrid:
         raise InputError(file, 'step', 'a whole number of nanoseconds', f'{step!r} s')
     steps = duration / step
     last = round(steps) if duration else None
-    if last is not None and (last < 1 or abs(steps - last) > 1e-9 * steps):
+    if last is not None and abs(steps - last) > 1e-9 * steps:
         raise InputError(file, 'duration', f'a multiple of step ({step:g} s)', f'{duration!r} s')
     return TimeGrid(step, step_ns, duration, last)
 

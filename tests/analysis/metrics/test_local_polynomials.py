@@ -1,5 +1,7 @@
 """The filter of rates: SciPy's at equal steps, exact on polynomials, honest of its gain."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers.strategies import QUICK
@@ -19,6 +21,7 @@ from auv_analysis.metrics.local_polynomials import (
     nearest,
     rates,
     residuals,
+    variance,
     weights,
 )
 
@@ -101,6 +104,12 @@ def test_residuals_tell_the_variance_of_noise_whatever_moves_slowly() -> None:
     assert_allclose(np.sqrt(squares / freedom), [0.01, 0.3], rtol=0.05)
 
 
+def test_the_variance_of_noise_is_that_of_all_signals_together() -> None:
+    rng, t = np.random.default_rng(12), 0.01 * np.arange(5000)
+    signals = [(t, size * rng.normal(size=(5000, 1))) for size in (0.1, 0.3)]
+    assert_allclose(variance(signals), (0.1**2 + 0.3**2) / 2.0, rtol=0.1)
+
+
 def test_a_value_is_that_of_the_fitted_polynomial() -> None:
     t = np.array([0.0, 0.1, 0.25, 0.3, 0.5, 0.55, 0.7, 0.9, 1.0])
     (w,) = weights(t, np.array([0.4]), np.arange(9)[None], 3, rate=False)
@@ -175,3 +184,20 @@ def test_an_error_is_also_what_white_noise_leaves_and_two_orders_more_would_chan
     shown, real = (np.sqrt((part**2).mean()) for part in (error[:, 5], off))
     assert shown == pytest.approx(real, rel=0.2)
     assert np.ptp(error[13:-13, 5]) < 0.2 * shown, 'it is smoothed over the window'
+
+
+def bending(growth: float) -> Stretch:
+    """A sine that bends so fast that its error is a bias, and grows by so much per s."""
+    t = 0.02 * np.arange(400)
+    return stretch(t, (np.exp(growth * t) * np.sin(12.0 * t))[:, None] * np.ones(6))
+
+
+def test_a_bias_is_smoothed_over_the_window_however_densely_it_is_asked_for() -> None:
+    dense = replace(bending(0.0), at=np.arange(5.0, 7.0, 0.005))
+    _, error = filtered([dense], np.full(6, 13), 0.005)
+    assert np.ptp(error[60:-60]) < 0.1 * error.mean()
+
+
+def test_the_error_at_the_begin_has_nothing_of_the_end() -> None:
+    _, error = filtered([bending(1.0)], np.full(6, 13), 0.02)
+    assert error[:50].max() < 0.5 * error[-50:].min()

@@ -37,6 +37,8 @@ def test_columns_are_named_like_those_of_a_sweep(summary) -> None:
     assert columns[f'coupling_terms.delta_xi.{term["to"]}.{term["from"]}.max'] == term['max']
     window = summary['kinetic_energy_windows'][0]
     assert columns['kinetic_energy_windows.0to10.mean'] == window['mean']
+    listed = [name for name in columns if name.startswith(('coupling_terms', 'kinetic_energy_w'))]
+    assert not [one for one in listed if {'to', 'from', 'window'} & {*one.split('.')}], 'twice'
 
 
 def leaves(value):

@@ -123,7 +123,7 @@ def at_voltage(curve: ThrusterCurve, nominal: float, voltage: float) -> Thruster
     family.sort(key=lambda one: one.voltage or 0.0)
     known = np.array([one.voltage for one in family], float)
     within = float(np.clip(voltage, known[0], known[-1]))
-    above = int(np.clip(np.searchsorted(known, within), 1, len(known) - 1))
+    above = max(int(np.searchsorted(known, within)), 1)
     low, high = (family[i].thrust(curve.commands) for i in (above - 1, above))
     share = (within - known[above - 1]) / (known[above] - known[above - 1])
     thrusts = (low + share * (high - low)) * (voltage / within) ** 2

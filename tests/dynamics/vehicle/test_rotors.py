@@ -110,6 +110,7 @@ def test_between_tabulated_voltages_thrust_is_linear_at_each_command():
     nominal, low, high = (load_curve(f't200_{v}v') for v in (16, 14, 16))
     found = at_voltage(nominal, 16.0, 14.5)
     assert_array_equal(found.commands, nominal.commands)
+    assert found.voltage is None
     assert_allclose(found.thrusts, 0.75 * low.thrusts + 0.25 * high.thrusts, atol=1e-12)
     assert_allclose(at_voltage(nominal, 16.0, 12.0).thrusts, load_curve('t200_12v').thrusts)
 

@@ -62,12 +62,15 @@ def written(folder, text):
     return path
 
 
-def test_curve_of_a_file_in_percent(tmp_path):
-    written(tmp_path, '# bench, 12 V\npercent, thrust_n\n-100,-20\n-10,0\n8,0\n100,30\n')
+def test_curve_of_a_file_in_percent(tmp_path, monkeypatch):
+    written(tmp_path, '# bench, 12 V\npercent, thrust_n\n-100,-20\n\n-10,0\n8,0\n100,30\n')
     curve = load_curve('curve.csv', tmp_path)
     assert curve.unit == 'percent'
     assert_allclose(curve.thrust(np.array([-55, 0, 54])), [-10, 0, 15])
     assert_allclose(curve.command(np.array([-10, 0, 15])), [-55, 0, 54])
+    assert_allclose(curve.thrust(np.array([-55, 54]), True), curve.thrust(np.array([55, -54])))
+    monkeypatch.chdir(tmp_path)
+    assert load_curve('curve.csv', tmp_path / 'elsewhere').unit == 'percent'
 
 
 def test_a_measured_curve_may_fall_by_its_noise_only(tmp_path):
@@ -82,7 +85,16 @@ def test_a_curve_without_a_dead_band_crosses_zero_at_its_command():
     curve = ThrusterCurve('x', 'command', np.array([-1.0, 1.0]), np.array([-1.0, 3.0]))
     assert curve.dead_band == (-0.5, -0.5)
     assert curve.thrust(0.0) == 1.0  # no pulse is of pulse widths alone
+    assert_array_equal(curve.thrust(np.array([1.0, -0.5]), True), [-1.0, 2.0])
     assert_allclose(curve.command(np.array([-0.5, 0.0, 1.0])), [-0.75, -0.5, 0.0])
+
+
+@pytest.mark.parametrize('way', [1.0, -1.0])
+def test_a_thruster_that_pushes_one_way_only_has_a_curve(tmp_path, way):
+    rows = sorted([[0.0, 0.0], [0.2 * way, 0.0], [1.0 * way, 4.0 * way]])
+    table = '\n'.join(f'{command},{thrust}' for command, thrust in rows)
+    curve = load_curve(written(tmp_path, f'command,thrust_n\n{table}\n'))
+    assert_allclose(curve.command(way * np.array([0.0, 1.0, 2.0])), way * np.array([0.0, 0.4, 0.6]))
 
 
 @pytest.mark.parametrize(
@@ -95,7 +107,11 @@ def test_a_curve_without_a_dead_band_crosses_zero_at_its_command():
         ('pwm_us,thrust_n\n1100\n', 'line 2: expected two numbers'),
         ('pwm_us,thrust_n\n1100,1\n', 'two and more rows'),
         ('pwm_us,thrust_n\n1100,-1\n1500,nan\n', 'finite numbers'),
-        ('pwm_us,thrust_n\n1500,0\n1500,2\n', 'commands that rise, found 1500 after 1500'),
+        (
+            'pwm_us,thrust_n\n1100,-1\n1500,0\n1500,2\n',
+            'commands that rise, found 1500 after 1500',
+        ),
+        pytest.param(f'pwm_us,thrust_n\n{1:0200000},2\n', 'a CSV table', id='a huge cell'),
         (
             'pwm_us,thrust_n\n1100,2\n1900,-2\n',
             r'from astern or zero to ahead, found \[2.0, -2.0\]',

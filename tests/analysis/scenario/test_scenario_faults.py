@@ -58,6 +58,7 @@ def test_what_is_between_law_and_vehicle(tmp_path, faults, changes, senses, acts
         ([{**DROP, 'from': 0.011, 'to': 0.019}], 'faults[0].to', '0.01 s apart', '0.019 s'),
         ([{'kind': 'sensor_delay'}], 'faults[0].delay', 'a positive number up to 10', 'nothing'),
         ([{**DELAY, 'delay': 0.015}], 'faults[0].delay', 'a multiple of step', '0.015 s'),
+        ([{**DELAY, 'delay': 1e-9}], 'faults[0].delay', 'a multiple of step', '1e-09 s'),
         ([DELAY, {**DELAY, 'from': 1.0}], 'faults[1]', 'one sensor_delay at a time', 'faults[0]'),
         ([{'kind': 'sensor_bias'}], 'faults[0]', 'velocity, attitude or both', 'sensor_bias'),
         ([{'kind': 'sensor_bias', 'velocity': [1, 2]}], 'faults[0].velocity', '6 numbers', '2'),

@@ -316,7 +316,7 @@ class FaultRows:
         delay = np.zeros(len(k), int)
         for fault in self._faults.of('sensor_delay'):
             delay[fault.there(k)] = self._faults.delay_of(fault)
-        seen = np.maximum(np.maximum.accumulate(k - delay), self._seen) if len(k) else k
+        seen = np.maximum(np.maximum.accumulate(k - delay), self._seen)
         self._seen = int(seen[-1]) if len(k) else self._seen
         return k - seen
 
@@ -327,7 +327,7 @@ class FaultRows:
             lost |= losses.rows(k)
             there = fault.there(k)
             timeout[there] = np.minimum(timeout[there], fault.spec.get('timeout', np.inf))
-        heard = np.maximum.accumulate(np.where(lost, self._heard, k)) if len(k) else k
+        heard = np.maximum.accumulate(np.where(lost, self._heard, k))
         self._heard = int(heard[-1]) if len(k) else self._heard
         overdue = k - heard > timeout / self._faults.step + WHOLE
         return np.where(lost, np.where(overdue, ZEROED, HELD), 0.0)

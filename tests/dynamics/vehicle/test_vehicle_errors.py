@@ -241,3 +241,9 @@ def test_what_is_odd_but_usable_is_a_warning(tmp_path, data, key, text):
 
 def test_nothing_odd_no_warning(tmp_path):
     assert load_vehicle(written(tmp_path, changed('added_mass', [1.0] * 6))).warnings == ()
+
+
+def test_rounding_makes_no_plate_and_no_thin_body_impossible(tmp_path):
+    data = changed('added_mass', [100.0, 1.0, 1.0, 1.0, 1.0, -1e-8])
+    data['rigid_body']['inertia'] = np.diag([100.0, 200.0, 300.0 + 1e-7]).tolist()
+    assert load_vehicle(written(tmp_path, data)).M_A[5, 5] == -1e-8

@@ -107,6 +107,21 @@ def test_a_second_order_rotor_solves_its_equation(zeta):
     assert_allclose(found, expected, atol=1e-7)
 
 
+@pytest.mark.parametrize(
+    'rotor', [{'lag': 0.15}, {'omega': 14.0, 'zeta': 0.3}, {'lag': 0.1, 'lag_at': 20.0}]
+)
+def test_thrusters_without_a_rotor_follow_at_once_beside_one_that_lags(rotor):
+    data = copy.deepcopy(DATA)
+    for one in data['thrusters']:
+        del one['rotor']
+    data['thrusters'][1]['rotor'] = rotor
+    [found] = chain({'rotors': True}, [TAU], vehicle_from_dict(data, 'v'))
+    missing, of_it = TAU - found, T[:, 1]
+    share = missing @ of_it / (of_it @ of_it) / (INVERSE @ TAU)[1]
+    assert 0.5 < share <= 1.0
+    assert_allclose(missing, share * (INVERSE @ TAU)[1] * of_it, atol=1e-12)
+
+
 FULL = T @ np.array([0, 0, 0, 0, 51.5, 51.5, 51.5, 51.5])  # heave, at the limit ahead
 
 

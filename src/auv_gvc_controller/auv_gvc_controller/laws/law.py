@@ -43,8 +43,8 @@ def law_class(name: str) -> Any:
     if name in SHIPPED:
         return SHIPPED[name]
     expected = f'{", ".join(SHIPPED)} or module:Class'
-    module, colon, attribute = name.partition(':')
-    if not (colon and module and attribute):
+    module, _, attribute = name.partition(':')
+    if not (module and attribute):
         raise ValueError(f'expected {expected}{meant(name, SHIPPED)}, found {name!r}')
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())  # a user's module may lie where `auv` was started

@@ -85,6 +85,7 @@ def test_every_form_of_a_gain():
         (PAPER | {'k_d': 1.0, 'gamma': 1.0}, '^k_d: .*nearest: k_D'),
         (PAPER | {'k_I': [1.0, 2.0]}, r'^k_I: expected 1, 6 or 36 numbers, found shape \(2,\)'),
         (PAPER | {'Lambda': float('nan')}, '^Lambda: expected finite numbers, found nan'),
+        (PAPER | {'k_I': [1.0] * 5 + [float('inf')]}, '^k_I: expected finite numbers, found'),
         (PAPER | {'Gamma': [[1.0] * 6] * 5}, r'^Gamma: expected .* found shape \(5, 6\)'),
         (PAPER | {'Gamma': 'much'}, '^Gamma: '),
     ],

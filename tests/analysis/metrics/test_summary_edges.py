@@ -81,7 +81,8 @@ def test_of_a_wrench_that_was_estimated_each_figure_is_its_own():
     assert estimate_figures(known, error)['max'][:3] == [4.0, 8.0, 12.0]
 
 
-def test_what_overflows_is_null(run):
-    found = summarize(replace(run, tau=np.full_like(run.tau, 1e200)))
+@pytest.mark.parametrize('source', ['simulate', 'bag'])
+def test_what_overflows_is_null(run, source):
+    found = summarize(replace(run, source=source, tau=np.full_like(run.tau, 1e200)))
     assert found['effort']['rms'] == [None] * 6
     json.dumps(found, allow_nan=False)

@@ -22,11 +22,12 @@ def add_columns(
 ) -> None:  # fmt: skip
     """Add samples, flat arrays (6 n,), to what (7, 6) is known of those before them: as columns."""
     nu, nu_d, tau, f, F = (np.ascontiguousarray(a.reshape(-1, 6).T) for a in (nu, nu_d, tau, f, F))
-    for s, signal in enumerate(signals(nu, nu_d, tau, f, F, maps)):
-        for i, values in enumerate(signal):
-            sums[s, i] += values.sum()
-            squares[s, i] += values @ values
-            peaks[s, i] = max(peaks[s, i], np.abs(values).max(initial=0.0))
+    with np.errstate(over='ignore'):  # infinite, which a figure says as not known
+        for s, signal in enumerate(signals(nu, nu_d, tau, f, F, maps)):
+            for i, values in enumerate(signal):
+                sums[s, i] += values.sum()
+                squares[s, i] += values @ values
+                peaks[s, i] = max(peaks[s, i], np.abs(values).max(initial=0.0))
 
 
 def _compiled() -> Any:

@@ -277,7 +277,8 @@ class Inspection:
             expected, size = self.lost[0].limit
             key = f'byte {self.lost[0].start}'
             raise InputError(self.path, key, expected, f'{size}; nothing else is wrong')
-        return list(dict.fromkeys(lost + found + (self._too_long if lost or found else [])))
+        faults = lost + found
+        return list(dict.fromkeys(faults + self._too_long)) if faults else []
 
 
 @dataclass
